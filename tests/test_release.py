@@ -16,7 +16,7 @@ import pytest
 
 from scripts import build_release, measure_size
 from tests.pages import pages
-from urdfkin.system.lazy_import import EXTRAS, install_command
+from urdfkin.system.lazy_import import EXTRA_REQUIREMENTS, install_command
 
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -113,7 +113,7 @@ def installing() -> list[str]:
 def test_a_remedy_names_the_packages_of_the_extra() -> None:
     extras = PROJECT["optional-dependencies"]
     ours = {name: packages for name, packages in extras.items() if name not in ("docs", "release", "test")}
-    assert {name: [package] for name, package in EXTRAS.items()} == ours
+    assert {name: [package] for name, package in EXTRA_REQUIREMENTS.items()} == ours
     assert install_command("mujoco") == "pip install 'mujoco>=4,<5'"
 
 

@@ -31,7 +31,7 @@ from urdfkin.system.cache import CacheWarning, make_cache_folder, read_cached_fi
 
 @pytest.fixture(autouse=True)
 def _no_warning_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "_warned", set())
+    monkeypatch.setattr(cache, "_warned_messages", set())
 
 
 @pytest.fixture

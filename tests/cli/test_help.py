@@ -13,7 +13,7 @@ import pytest
 import urdfkin as library
 from tests.cli.running import good, imported, process, python, refused, urdfkin
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin.cli import _ABSENT, _SYNONYMS, cli, commands, groups
+from urdfkin.cli import _ADVICE_BY_WORD, _SYNONYMS, cli, commands, commands_by_heading
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.system.resources import robots_dir
@@ -119,10 +119,10 @@ def test_the_command_without_arguments_prints_the_help() -> None:
 
 def test_synonyms_lead_to_commands_and_commands_have_the_names_of_the_library() -> None:
     assert set(_SYNONYMS) & set(commands()) == set()
-    assert set(_ABSENT) & (set(commands()) | set(_SYNONYMS)) == set()
+    assert set(_ADVICE_BY_WORD) & (set(commands()) | set(_SYNONYMS)) == set()
     for meant in _SYNONYMS.values():
         assert meant.split()[0] in {*commands(), "--help", "--version"}
-    own = set(groups()["Compute"]) | {"dh", "screws", "chain", "export", "view"}
+    own = set(commands_by_heading()["Compute"]) | {"dh", "screws", "chain", "export", "view"}
     assert [name for name in own if not hasattr(Robot, name.replace("-", "_"))] == []
     functions = "same", "diff", "calibrate", "validate", "check"
     assert [name for name in functions if not hasattr(library, name)] == []

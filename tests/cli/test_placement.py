@@ -90,7 +90,7 @@ def test_all_representations_are_known_and_a_singularity_is_reported_with_a_reme
     err = refused("analytical-jacobian planar_two_link --q 0.3,0.4")
     assert "representational singularity" in err
     assert "another sequence or by a quaternion" in err
-    labels = [row.labels for row in quantity._FORMS.values()]
+    labels = [row.labels for row in quantity._POSE_FORMS.values()]
     assert sorted(map(len, labels)) == [6, 7, 7]
     assert len(set(labels)) == len(labels)
 

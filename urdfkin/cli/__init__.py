@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 #: Commands below each heading of the help page, each with its module in `urdfkin.cli` and its summary.
 #: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
-_COMPUTE = "Compute"
-_GROUPS: dict[str, dict[str, tuple[str, str]]] = {
+_COMPUTE_HEADING = "Compute"
+_COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
         "robots": ("robots", "List the robots of the catalogue, which are loaded by name."),
         "info": ("robots", "Show the whole robot: links, joints, limits, frames and coordinates."),
@@ -35,7 +35,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "view": ("view", "Show a robot in a browser, with a slider for each joint and verified results."),
         "plot": ("view", "Plot a frame's motion along a trajectory."),
     },
-    _COMPUTE: {
+    _COMPUTE_HEADING: {
         "analytical-jacobian": (
             "quantity",
             "Compute the analytical Jacobian: derivatives of a frame's position and angles.",
@@ -94,18 +94,18 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
 }
 
 
-def groups() -> dict[str, dict[str, tuple[str, str]]]:
+def commands_by_heading() -> dict[str, dict[str, tuple[str, str]]]:
     rows = {
         name: ("quantity", f"Compute the {row.summary}.") for name, row in quantities_by_command().items()
     }
-    return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
+    return _COMMANDS_BY_HEADING | {_COMPUTE_HEADING: rows | _COMMANDS_BY_HEADING[_COMPUTE_HEADING]}
 
 
 def commands() -> dict[str, tuple[str, str]]:
-    return {name: entry for entries in groups().values() for name, entry in entries.items()}
+    return {name: entry for entries in commands_by_heading().values() for name, entry in entries.items()}
 
 
-def _by_word(table: dict[str, str]) -> dict[str, str]:
+def _invert_table(table: dict[str, str]) -> dict[str, str]:
     """Invert a table: `{"info": "show tree"}` becomes `{"show": "info", "tree": "info"}`."""
     return {word: key for key, words in table.items() for word in words.split()}
 
@@ -113,7 +113,7 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
 #: Suggested commands for words that are not commands.
 #: For example, urdfkin suggests `placement` for the word "fk".
 #: Each key is the suggested command, and the value lists the words.
-_SYNONYMS = _by_word(
+_SYNONYMS = _invert_table(
     {
         "--help": "help usage man",
         "--version": "version",
@@ -142,7 +142,7 @@ _SYNONYMS = _by_word(
     }
 )
 #: Advice for computations that urdfkin lacks, for example "ik".
-_ABSENT = _by_word(
+_ADVICE_BY_WORD = _invert_table(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm. For an"
         " iterative solver, `placement` computes the pose, and `jacobian` computes the Jacobian":
@@ -159,7 +159,7 @@ def _unknown_command(name: str) -> UrdfkinError:
     if word in commands():
         return UnknownNameError("command", name, [word])
     error = UnknownNameError("command", name, commands())
-    if (advice := _ABSENT.get(word)) is not None:
+    if (advice := _ADVICE_BY_WORD.get(word)) is not None:
         error.remedy, error.nearest = advice, ()
     elif (command := _SYNONYMS.get(word)) is not None:
         error.remedy, error.nearest = f"did you mean {command}?", (command,)
@@ -203,7 +203,7 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         width = max(map(len, commands()))
-        for heading, entries in groups().items():
+        for heading, entries in commands_by_heading().items():
             with formatter.section(heading):
                 formatter.write_dl([(name.ljust(width), summary) for name, (_, summary) in entries.items()])
 

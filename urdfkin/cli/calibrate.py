@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.robot import Robot
 
-_FORMS = (*TEXT_FORMATS, "json")
+_FORMATS = (*TEXT_FORMATS, "json")
 
 
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
@@ -91,7 +91,7 @@ _FORMS = (*TEXT_FORMATS, "json")
     help="Write all fitted parameters, not only those that changed by more than 2 sigma.",
 )
 @click.option("--force", is_flag=True, help="Write the calibration even if urdfkin finds it implausible.")
-@format_option(*_FORMS, help_="Output format of the report.")
+@format_option(*_FORMATS, help_="Output format of the report.")
 @click.option(
     "--output",
     "-o",
@@ -144,20 +144,20 @@ def calibrate_command(
     report = TextDocument("") if calibration is None else document(calibration)
     parts = list(report.parts)
 
-    def answer(check: str = "", code: int = 0) -> NoReturn:
+    def write_answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
         # JSON is returned as text: `Answer` would add the entries `verified` and `check` to a mapping.
-        Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
+        Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMATS)
         context.exit(code)
 
     if written is None or (calibration is not None and calibration.full_fit is None):
-        answer()
+        write_answer()
     if calibration is not None and calibration.plausibility.objections:
         is_refused = calibration.plausibility.is_in_degrees or not context.params["force"]
         word = "error" if is_refused else "warning"
         say(f"urdfkin: {word}: {_implausible(calibration, is_refused)}", err=True)
         if is_refused:
-            answer(code=3)
+            write_answer(code=3)
     if written.origins:
         parts.append(displacement_table(written))
     if output is not None:
@@ -167,8 +167,8 @@ def calibrate_command(
             parts += lines_of(replace(written.changes, sources=(loaded.source, str(output))))
     certificate = written.certificate if calibration is None else calibration.certificate
     if certificate is None:
-        answer()
-    answer(format_check_line(certificate), certificate_exit_code(certificate))
+        write_answer()
+    write_answer(format_check_line(certificate), certificate_exit_code(certificate))
 
 
 def _implausible(calibration: Calibration, is_refused: bool) -> ImplausibleError:

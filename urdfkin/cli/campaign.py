@@ -74,7 +74,9 @@ def format_progress(state: CampaignProgress, estimator: SpeedEstimator) -> str:
     )
     robots = f"{state.robots_done:,} of {state.robots:,} robots"
     chunks = f"{state.chunks_done:,} of {state.chunks:,} chunks{earlier}"
-    return f"{robots}, {chunks}; {_format_speed(state, estimator)}{_format_failures(state)}; {state.label}"
+    return (
+        f"{robots}, {chunks}; {_format_speed(state, estimator)}{_format_failure_count(state)}; {state.label}"
+    )
 
 
 def format_duration(seconds: float) -> str:
@@ -98,7 +100,7 @@ def _format_speed(state: CampaignProgress, estimator: SpeedEstimator) -> str:
     return f"{rate:.3g} chunks/s, {format_duration(left)} left, "
 
 
-def _format_failures(state: CampaignProgress) -> str:
+def _format_failure_count(state: CampaignProgress) -> str:
     return f"{state.failures:,} failed" if state.failures else "none failed"
 
 
@@ -142,7 +144,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
         def show_progress(state: CampaignProgress) -> None:
             speed = _format_speed(state, estimator)
-            words = f"{state.robots_done}/{state.robots} robots, {speed}{_format_failures(state)},"
+            words = f"{state.robots_done}/{state.robots} robots, {speed}{_format_failure_count(state)},"
             done, label = state.chunks_done, escape_unprintable(state.label)
             bar.update(task, completed=done, total=state.chunks, description=label, words=words)
 
@@ -151,7 +153,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
 _MAX_FAILED = 20
 #: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
-_MAX_CHUNKS = 200
+_MAX_TIMED_CHUNKS = 200
 
 
 @click.command(
@@ -228,7 +230,7 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
 
     begun = [robot for robot, (done, _) in counts.items() if done]
     seconds = []
-    for robot in begun[:: max(1, len(begun) // _MAX_CHUNKS)][:_MAX_CHUNKS]:
+    for robot in begun[:: max(1, len(begun) // _MAX_TIMED_CHUNKS)][:_MAX_TIMED_CHUNKS]:
         answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
         seconds += [next(answer.seconds for answer in answers if isinstance(answer, ChunkResult))]
     return sum(seconds) / len(seconds) if seconds else None

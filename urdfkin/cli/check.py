@@ -28,7 +28,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import format_count, write_output
 from urdfkin.cli.shell import complete_code, complete_file
-from urdfkin.cli.streams import escape_for_terminal, print_commands, say, say_styled
+from urdfkin.cli.streams import escape_for_terminal, print_github_commands, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import read_bytes, read_start, require_regular_file, write_file
 from urdfkin.system.git import CommitFiles, merge_base_files
@@ -70,8 +70,8 @@ class CheckOutcome:
         obsolete_count: Number of findings that the baseline file lists, but that the checked files no longer
             have.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
-        with_error: Files with a finding of severity error. --fix does not change these files. A warning that
-            --strict reports as an error does not count.
+        files_with_errors: Files with a finding of severity error. --fix does not change these files. A
+            warning that --strict reports as an error does not count.
         unwritable: Names of texts that --fix cannot write: standard input, an expanded .xacro file, and a
             robot of the catalogue.
     """
@@ -87,7 +87,7 @@ class CheckOutcome:
     fixable_count: int = 0
     patches: list[str] = field(default_factory=list)
     unsafe_count: int = 0
-    with_error: set[str] = field(default_factory=set)
+    files_with_errors: set[str] = field(default_factory=set)
     unwritable: set[str] = field(default_factory=set)
 
     def add(self, file: str, found: Examination) -> None:
@@ -109,7 +109,7 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
         click.echo(as_sarif(findings, version, outcome.silenced_findings))
     elif style == "github":
         if findings:
-            print_commands(as_github(findings))
+            print_github_commands(as_github(findings))
     elif statistics:
         for line in format_statistics(outcome.findings_with_usable_fixes()):
             say(line)
@@ -133,7 +133,7 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
     fixes = [finding.fix for finding in findings if finding.fix]
     unsafe = sum(not fix.is_safe for fix in fixes)
     if len(fixes) > unsafe:
-        refused = any(finding.fix and finding.file in outcome.with_error for finding in findings)
+        refused = any(finding.fix and finding.file in outcome.files_with_errors for finding in findings)
         note = "correct the errors of a file first" if refused else "--diff prints the changes"
         say(f"[*] --fix fixes these findings; {note}")
     if unsafe:
@@ -166,20 +166,20 @@ def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
         say(f"{file}: fixed {code} {RULES[code].slug}, {where}{effect}", err=True)
 
 
-_SETTINGS = "urdfkin.settings"
+_SETTINGS_KEY = "urdfkin.settings"
 #: Settings in pyproject.toml that replace the defaults of options
-_OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
+_OPTION_SETTINGS = ("select", "ignore", "exclude", "strict", "notes")
 
 
 def _read_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
     isolated = "--isolated" in context.meta
     settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
     values = dict(settings.values)
-    defaults: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values}
+    defaults: dict[str, Any] = {name: values[name] for name in _OPTION_SETTINGS if name in values}
     if "baseline" in values:
         defaults["baseline"] = str(settings.root / values["baseline"])
     context.default_map = defaults
-    context.meta[_SETTINGS] = settings
+    context.meta[_SETTINGS_KEY] = settings
 
 
 def _isolate(context: click.Context, _: click.Parameter, isolated: bool) -> None:
@@ -187,7 +187,7 @@ def _isolate(context: click.Context, _: click.Parameter, isolated: bool) -> None
         context.meta["--isolated"] = True
 
 
-choice_options = combine(
+finding_options = combine(
     click.option(
         "--select",
         multiple=True,
@@ -221,7 +221,7 @@ choice_options = combine(
         help="Report only findings that are new since a branch, tag or commit of git.",
     ),
 )
-settings_options = combine(
+settings_file_options = combine(
     click.option(
         "--isolated", is_flag=True, is_eager=True, expose_value=False, callback=_isolate,
         help="Ignore the settings in pyproject.toml.",
@@ -231,7 +231,7 @@ settings_options = combine(
         help="File with a table [tool.urdfkin] of settings.", show_default="the nearest pyproject.toml",
     ),
 )  # fmt: skip
-_LIMITS = {
+_SIZE_LIMIT_HELP = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of XML elements.",
     "elements": "Largest number of XML elements in a file.",
@@ -240,13 +240,13 @@ _LIMITS = {
     "number": "Largest number of characters in a number.",
     "markup": "Largest size of a tag, comment or processing instruction in bytes.",
 }
-limit_options = combine(
+size_limit_options = combine(
     *(
         click.option(
             f"--max-{limit.name}",
             type=WholeNumber(1),
             default=limit.default,
-            help=_LIMITS[limit.name],
+            help=_SIZE_LIMIT_HELP[limit.name],
         )
         for limit in fields(SizeLimits)
     )
@@ -274,7 +274,7 @@ limit_options = combine(
 )
 @click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
 @click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")
-@choice_options
+@finding_options
 @click.option(
     "--each",
     is_flag=True,
@@ -285,8 +285,8 @@ limit_options = combine(
     "With this root joint, a joint with the name root_joint or a link with the name universe is an error."
 )
 @source_options
-@settings_options
-@limit_options
+@settings_file_options
+@size_limit_options
 @click.pass_context
 def check_command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
@@ -317,7 +317,7 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
         reject_unused_options(context, ("output", "style", "statistics"), "with --write-baseline")
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
         reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
-    run = _make_run(context.meta[_SETTINGS], options)
+    run = _make_run(context.meta[_SETTINGS_KEY], options)
     for word in files or ["."]:
         run.check_all(word, options["exclude"])
     outcome = run.outcome
@@ -355,7 +355,7 @@ def _make_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
     baseline = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
     since = options["changed_since"]
     how = load_options()
-    look = partial(
+    examine_text = partial(
         examine,
         limits=SizeLimits(**{limit.name: options[f"max_{limit.name}"] for limit in fields(SizeLimits)}),
         mimic=how["mimic"],
@@ -365,16 +365,16 @@ def _make_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
         options, "ignore"
     )
     return CheckRun(
-        look=look,
+        examine_text=examine_text,
         finding_filter=FindingFilter(codes_, options["notes"], settings, baseline),
         # A baseline stores the original severities.
         strict=options["strict"] and not writing,
         fold=options["style"] in ("terminal", "concise", "github") and not (options["each"] or writing),
         fix=options["fix"],
         diff=options["diff"],
-        unsafe=options["unsafe_fixes"],
-        version=None if since is None else merge_base_files(since, Path()),
-        accepts_all=writing,
+        allows_unsafe_fixes=options["unsafe_fixes"],
+        commit_files=None if since is None else merge_base_files(since, Path()),
+        writes_baseline=writing,
     )
 
 
@@ -391,19 +391,19 @@ class CheckRun:
 
     Attributes:
         fold: Whether findings with the same code share a line of output.
-        accepts_all: True with --write-baseline. A finding of severity error then does not change the
+        writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
     """
 
-    look: partial[Examination]
+    examine_text: partial[Examination]
     finding_filter: FindingFilter
     strict: bool
     fold: bool
     fix: bool
     diff: bool
-    unsafe: bool
-    version: CommitFiles | None
-    accepts_all: bool
+    allows_unsafe_fixes: bool
+    commit_files: CommitFiles | None
+    writes_baseline: bool
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
     _checked_files: set[str] = field(default_factory=set)
     _has_changes: dict[tuple[str, ...], bool] = field(default_factory=dict)
@@ -430,26 +430,28 @@ class CheckRun:
         if _is_usd_or_mjcf(file):
             self._check_usd_or_mjcf(file)
             return
-        text = read_source(file, self.look.keywords["limits"].bytes, load_options()["xacro_args"])
+        text = read_source(file, self.examine_text.keywords["limits"].bytes, load_options()["xacro_args"])
         before = None
-        if self.version is not None:
-            before = find_known_findings(text, self.version, self.look)
+        if self.commit_files is not None:
+            before = find_known_findings(text, self.commit_files, self.examine_text)
             if before is None:
                 self.outcome.unchanged_count += 1
                 return
         if self.fix or self.diff:
             text = self._fix(file, text, lambda: self.finding_filter.make_independent_predicate(text, before))
-        found = self.look(text, fold=self.fold, is_reported=self.finding_filter.make_predicate(text, before))
+        found = self.examine_text(
+            text, fold=self.fold, is_reported=self.finding_filter.make_predicate(text, before)
+        )
         if any(finding.severity is Severity.ERROR for finding in found.findings):
-            self.outcome.with_error.add(file)
+            self.outcome.files_with_errors.add(file)
         if _find_writable_path(text) is None:
             self.outcome.unwritable.add(text.label)
-        findings = [self._with_severity(finding) for finding in found.findings]
+        findings = [self._apply_strict(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
         suffixes = USD_SUFFIXES if is_usd(file) else _MJCF
-        if self.version is not None and self._is_unchanged(file, suffixes, self.version):
+        if self.commit_files is not None and self._is_unchanged(file, suffixes, self.commit_files):
             self.outcome.unchanged_count += 1
             return
         from urdfkin.robot.loading import load
@@ -465,39 +467,42 @@ class CheckRun:
                 found = error.findings
         text = UrdfText(b"", file, file)
         is_chosen = self.finding_filter.make_predicate(text)
-        findings = tuple(self._with_severity(finding) for finding in found if is_chosen(finding))
+        findings = tuple(self._apply_strict(finding) for finding in found if is_chosen(finding))
         has_lines = any(one.width and one.file == file for one in findings)
         data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
         self.outcome.add(file, Examination(text, data, None, findings, ()))
 
-    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: CommitFiles) -> bool:
-        """Return whether a file and its included files are the same as in the commit `version`.
+    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
+        """Return whether a file and its included files are the same as in `commit_files`.
 
         Every file of the commit with a suffix in `suffixes` counts as an included file. A file that was
         deleted after the commit also counts if the deleted file's name occurs in the checked file.
         """
         if suffixes not in self._has_changes:
-            self._has_changes[suffixes] = version.has_changes(suffixes)
+            self._has_changes[suffixes] = commit_files.has_changes(suffixes)
         if self._has_changes[suffixes]:
             return False
         data = read_bytes(Path(file))
-        return version.contains(data) and not any(os.fsencode(name) in data for name in version.missing_names)
+        return commit_files.contains(data) and not any(
+            os.fsencode(name) in data for name in commit_files.missing_names
+        )
 
-    def _fix(self, file: str, text: UrdfText, choose: Any) -> UrdfText:
+    def _fix(self, file: str, text: UrdfText, make_predicate: Any) -> UrdfText:
         path = _find_writable_path(text)
         if path is None:
             return text
-        result = fix_text(text, self.look, lambda: self._safe(choose()))
+        result = fix_text(text, self.examine_text, lambda: self._make_safe_predicate(make_predicate()))
         for code, objection in result.unfixed_reasons.items():
             say(f"{file}: {code} is not fixed: {objection}", err=True)
         if self.diff:
             self.outcome.fixable_count += len(result.fixed_findings)
             self.outcome.patches.append(make_patch(file, text.data, result.text.data, escape_for_terminal))
-            chosen, findings = choose(), self.look(result.text).findings
+            chosen, findings = make_predicate(), self.examine_text(result.text).findings
             # --fix does not change a file with an error.
             if not any(finding.severity is Severity.ERROR for finding in findings):
                 self.outcome.unsafe_count += sum(
-                    chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe for f in findings
+                    chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.allows_unsafe_fixes
+                    for f in findings
                 )
             return text
         if result.fixed_findings:
@@ -505,12 +510,12 @@ class CheckRun:
             _report_fixes(file, result.fixed_findings)
         return result.text
 
-    def _safe(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
+    def _make_safe_predicate(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
         return lambda finding: (
-            is_chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
+            is_chosen(finding) and (self.allows_unsafe_fixes or finding.fix is None or finding.fix.is_safe)
         )
 
-    def _with_severity(self, finding: Finding) -> Finding:
+    def _apply_strict(self, finding: Finding) -> Finding:
         is_raised = self.strict and finding.severity is Severity.WARNING
         return replace(finding, severity=Severity.ERROR) if is_raised else finding
 
@@ -520,7 +525,7 @@ class CheckRun:
         if self.diff:
             return int(self.outcome.fixable_count > 0)
         has_error = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
-        return int(has_error and not self.accepts_all)
+        return int(has_error and not self.writes_baseline)
 
 
 def _find_writable_path(text: UrdfText) -> Path | None:

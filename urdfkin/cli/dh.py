@@ -51,7 +51,7 @@ def _columns(_context: click.Context, _option: click.Parameter, value: str) -> t
     return names
 
 
-part_options = combine(
+path_or_tree_options = combine(
     path_options,
     click.option(
         "--all", "all_", is_flag=True, help="Write a table from the base to each leaf link of the robot."
@@ -60,7 +60,7 @@ part_options = combine(
         "--tree", is_flag=True, help="Write the Khalil-Kleinfinger parameters of the whole tree of links."
     ),
 )
-choice_options = combine(
+derivation_options = combine(
     _choice(
         "--convention",
         ("standard", "modified"),
@@ -158,11 +158,11 @@ form_options = combine(
 
 #: Options that cannot be combined with --like.
 #: With --like, a published table determines the values of these options.
-_SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
-_CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
+_OPTIONS_FIXED_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
+_DERIVATION_OPTIONS = ("convention", "near_parallel", "snap", "slide", "like", *_OPTIONS_FIXED_BY_LIKE)
 #: If ROBOT is a Denavit-Hartenberg table, only these options make the command derive a new table.
-_DERIVING = ("base", "tip", "all_", "lock", "joints", *_CHOICES[1:])
-_UNITS = ("degrees", "millimetres", "digits", "columns")
+_NEW_TABLE_OPTIONS = ("base", "tip", "all_", "lock", "joints", *_DERIVATION_OPTIONS[1:])
+_PRINTED_TABLE_OPTIONS = ("degrees", "millimetres", "digits", "columns")
 
 
 def _reject_unused(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
@@ -170,12 +170,16 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
     printed = ("terminal", "markdown", "html", "latex")
     for unused, where, because in (
         (("tolerance", "fit"), not compares, "without --compare"),
-        ((*_CHOICES, "verify"), compares, "with --compare"),
-        ((*_CHOICES, "base", "tip"), tree, "with --tree"),
+        ((*_DERIVATION_OPTIONS, "verify"), compares, "with --compare"),
+        ((*_DERIVATION_OPTIONS, "base", "tip"), tree, "with --tree"),
         (("tip", "like"), options["all_"], "with --all"),
-        (_SIGNS, options["like"] is not None, "with --like"),
+        (_OPTIONS_FIXED_BY_LIKE, options["like"] is not None, "with --like"),
         (("columns",), tree or compares, "unless the output is one table"),
-        (_UNITS, form not in printed, f"in the format {form!r}: its numbers are in metres and radians"),
+        (
+            _PRINTED_TABLE_OPTIONS,
+            form not in printed,
+            f"in the format {form!r}: its numbers are in metres and radians",
+        ),
         (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot from a table"),
     ):
         if where:
@@ -184,8 +188,8 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 
 @click.command(epilog="Example: urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres")
 @robot_argument
-@part_options
-@choice_options
+@path_or_tree_options
+@derivation_options
 @compare_options
 @form_options
 @verify_option
@@ -212,11 +216,17 @@ def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     options["format_"] = context.params["format_"]
     _reject_unused(context, is_table, options)
     loaded = load_robot(robot, verify=verify)
-    unchanged = (
-        robot if is_table and not any(is_on_command_line(context, name) for name in _DERIVING) else None
+    unchanged_table = (
+        robot
+        if is_table and not any(is_on_command_line(context, name) for name in _NEW_TABLE_OPTIONS)
+        else None
     )
-    if (unchanged or options["like"]) and not is_on_command_line(context, "convention"):
+    if (unchanged_table or options["like"]) and not is_on_command_line(context, "convention"):
         options["convention"] = None
     with report_compilation():
-        choices = {name: options.pop(name) for name in ("near_parallel", "slide", *_SIGNS)}
-        return make_dh_answer(DHRequest(robot=loaded, unchanged=unchanged, choices=choices, **options))
+        dh_arguments = {
+            name: options.pop(name) for name in ("near_parallel", "slide", *_OPTIONS_FIXED_BY_LIKE)
+        }
+        return make_dh_answer(
+            DHRequest(robot=loaded, unchanged_table=unchanged_table, dh_arguments=dh_arguments, **options)
+        )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.cli.options import lock_settings, locked_line
-from urdfkin.cli.output import Answer, format_path_check
+from urdfkin.cli.output import Answer, format_pinocchio_check
 from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import (
@@ -53,26 +53,27 @@ from urdfkin.system.files import expand_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
-_FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
+_MULTI_TABLE_FORMATS = ("terminal", "markdown", "latex", "json")
 #: Formats in which the result of the check is printed below the table
-_PRINTED = ("terminal", "markdown")
-_TEXTS = (*_PRINTED, "html", "latex")
+_FORMATS_WITH_CHECK_LINE = ("terminal", "markdown")
+_DOCUMENT_FORMATS = (*_FORMATS_WITH_CHECK_LINE, "html", "latex")
 #: Number of significant digits of the base and tool transforms in formats with rounded numbers.
 #: None means the value of --digits.
-_ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
+_TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 
 
 @dataclass(frozen=True, slots=True)
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `choices` contains the values that are passed to `Robot.dh` as keyword arguments. `unchanged` is the table
-    file ROBOT if no option in `urdfkin.cli.dh._DERIVING` is given. Otherwise, `unchanged` is None.
+    `dh_arguments` contains the values that are passed to `Robot.dh` as keyword arguments. `unchanged_table`
+    is the table file ROBOT if no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given. Otherwise,
+    `unchanged_table` is None.
     """
 
     robot: Robot
-    unchanged: str | None
-    choices: dict[str, Any]
+    unchanged_table: str | None
+    dh_arguments: dict[str, Any]
     base: str | None
     tip: str | None
     all_: bool
@@ -107,8 +108,8 @@ def make_dh_answer(request: DHRequest) -> Answer:
             f"{' and '.join(chosen)} cannot be used together", remedy="use only one of these options"
         )
     if request.compare is not None:
-        return _compare(request, request.compare)
-    return _write_tree(request) if request.tree else _write_tables(request)
+        return _make_comparison_answer(request, request.compare)
+    return _make_tree_answer(request) if request.tree else _make_tables_answer(request)
 
 
 def _require_format(request: DHRequest, option: str, formats: Sequence[str]) -> None:
@@ -122,23 +123,24 @@ def _require_format(request: DHRequest, option: str, formats: Sequence[str]) -> 
 # -- tables --------------------------------------------------------------------------------------------
 
 
-def _write_tables(request: DHRequest) -> Answer:
+def _make_tables_answer(request: DHRequest) -> Answer:
     tree, verifier, format_ = request.robot.tree, request.robot.verifier, request.format_
     tips = [tree.links[leaf] for leaf in tree.leaves()] if request.all_ else [request.tip]
     if len(tips) > 1:
-        _require_format(request, "--all", _FORMATS_OF_SEVERAL)
+        _require_format(request, "--all", _MULTI_TABLE_FORMATS)
     tables = [_make_table(request, tip, request.snap) for tip in tips]
     checks = [verifier.check_table(table) if verifier.policy else None for table in tables]
     results = list(zip(tables, checks, strict=True))
     if format_ == "json":
         lock = lock_settings(request.robot)
         documents = [
-            {**to_mapping(table), **lock, "checked": format_path_check(check)[0]} for table, check in results
+            {**to_mapping(table), **lock, "checked": format_pinocchio_check(check)[0]}
+            for table, check in results
         ]
         text = json.dumps(documents if request.all_ else documents[0], indent=2) + "\n"
     else:
         text = "\n".join(_format_table(request, table, check) for table, check in results)
-    if format_ not in (*_PRINTED, "json"):
+    if format_ not in (*_FORMATS_WITH_CHECK_LINE, "json"):
         for table, check in results:
             for line in _lines_below_table(request, table, check):
                 say(line, err=True)
@@ -148,8 +150,8 @@ def _write_tables(request: DHRequest) -> Answer:
 
 def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
-    if request.unchanged is not None:
-        table = read_table_or_screws(expand_home(request.unchanged))
+    if request.unchanged_table is not None:
+        table = read_table_or_screws(expand_home(request.unchanged_table))
         # If the file contains screws, the call of `Robot.dh` below derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
@@ -161,7 +163,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     if base is None and request.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     convention = request.convention or (like.convention if like else "standard")
-    return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **request.choices)
+    return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **request.dh_arguments)
 
 
 def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> str:
@@ -172,26 +174,28 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 
         return draw_table_svg(table)
     text = export(table, request.format_, request.units, verify=bool(request.robot.verifier.policy))
-    if request.format_ in _PRINTED:
+    if request.format_ in _FORMATS_WITH_CHECK_LINE:
         return "\n".join([text, *_lines_below_table(request, table, check), ""])
     return text
 
 
 def _lines_below_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    yield format_path_check(check)[0]
+    yield format_pinocchio_check(check)[0]
     yield from _locked_lines(request)
-    if request.format_ in _ROUNDED:
-        yield from str(measure_printed_table(table, request.units, _ROUNDED[request.format_])).split("\n")
-    if request.unchanged is None and (
+    if request.format_ in _TRANSFORM_DIGITS:
+        yield from str(measure_printed_table(table, request.units, _TRANSFORM_DIGITS[request.format_])).split(
+            "\n"
+        )
+    if request.unchanged_table is None and (
         hint := snap_hint(table, lambda snap: _make_table(request, table.tip_frame, snap))
     ):
         yield f"hint: {hint}"
-    if request.like is None and request.format_ in _PRINTED:
+    if request.like is None and request.format_ in _FORMATS_WITH_CHECK_LINE:
         yield from (f"hint: {line}" for line in suggest_published_tables(request.robot.origin.source))
 
 
 def _locked_lines(request: DHRequest) -> list[str]:
-    form = request.format_ if request.format_ in _PRINTED else "terminal"
+    form = request.format_ if request.format_ in _FORMATS_WITH_CHECK_LINE else "terminal"
     line = locked_line(request.robot)
     return [TextDocument("", [line]).render(form).rstrip("\n")] if line else []
 
@@ -199,9 +203,9 @@ def _locked_lines(request: DHRequest) -> list[str]:
 # -- the whole tree ------------------------------------------------------------------------------------
 
 
-def _write_tree(request: DHRequest) -> Answer:
+def _make_tree_answer(request: DHRequest) -> Answer:
     robot, format_ = request.robot, request.format_
-    _require_format(request, "--tree", (*_TEXTS, "csv", "json"))
+    _require_format(request, "--tree", (*_DOCUMENT_FORMATS, "csv", "json"))
     parameters = make_tree_parameters(robot.tree)
     if format_ == "json":
         text = json.dumps(as_mapping(parameters) | lock_settings(robot), indent=2, allow_nan=False) + "\n"
@@ -210,8 +214,8 @@ def _write_tree(request: DHRequest) -> Answer:
     else:
         text = tree_document(parameters, request.units).render(format_)
     check = robot.verifier.check_tree_parameters(parameters) if robot.verifier.policy else None
-    check_line = "\n".join([str(check or format_path_check(None)[0]), *_locked_lines(request)])
-    if format_ in _PRINTED:
+    check_line = "\n".join([str(check or format_pinocchio_check(None)[0]), *_locked_lines(request)])
+    if format_ in _FORMATS_WITH_CHECK_LINE:
         q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_zero_and_limits=True).q
         text += f"\n{check_line}\n{measure_printed_tree(parameters, request.units, q)}\n"
     else:
@@ -222,8 +226,8 @@ def _write_tree(request: DHRequest) -> Answer:
 # -- a comparison --------------------------------------------------------------------------------------
 
 
-def _compare(request: DHRequest, name: str) -> Answer:
-    _require_format(request, "--compare", (*_TEXTS, "json"))
+def _make_comparison_answer(request: DHRequest, name: str) -> Answer:
+    _require_format(request, "--compare", (*_DOCUMENT_FORMATS, "json"))
     path = reference_path(name)
     data = read_mapping(path)
     tip = request.tip or _frame_of_robot(request, data.get("tip_frame"))
@@ -305,26 +309,26 @@ def _comparison_data(
     }
 
 
-def _difference_data(one: CellDifference) -> dict[str, Any]:
+def _difference_data(difference: CellDifference) -> dict[str, Any]:
     return {
-        "row": one.row + 1,
-        "joint": one.joint,
-        "cell": one.cell,
-        "table": one.reference,
-        "urdf": one.urdf,
-        "tip_m": one.tip_displacement,
-        "within_last_digit": one.is_rounding,
+        "row": difference.row + 1,
+        "joint": difference.joint,
+        "cell": difference.cell,
+        "table": difference.reference,
+        "urdf": difference.urdf,
+        "tip_m": difference.tip_displacement,
+        "within_last_digit": difference.is_rounding,
     }
 
 
-def _mistake_data(one: Mistake) -> dict[str, Any]:
+def _mistake_data(mistake: Mistake) -> dict[str, Any]:
     return {
-        "kind": str(one.kind),
-        "rows": [row + 1 for row in one.rows],
-        "cell": one.cell and _difference_data(one.cell),
-        "still_fitted": asdict(one.fit_changes),
-        "tip_off_at_most_m": one.metres,
-        "tip_turned_at_most_rad": one.radians,
+        "kind": str(mistake.kind),
+        "rows": [row + 1 for row in mistake.rows],
+        "cell": mistake.cell and _difference_data(mistake.cell),
+        "still_fitted": asdict(mistake.fit_changes),
+        "tip_off_at_most_m": mistake.metres,
+        "tip_turned_at_most_rad": mistake.radians,
     }
 
 

@@ -17,7 +17,7 @@ from urdfkin.urdf.findings import Rule, shorten
 from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, PROSE_WIDTH, RULES, explain, find_rule, page
 
 _LINK = re.compile(r"\[([^\]]+)\]\([^)\s]+\)")
-_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_CODE_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
@@ -25,7 +25,10 @@ def answers() -> dict[str, str]:
 
     Each link in a section is replaced by the text of the link.
     """
-    return {make_anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
+    return {
+        make_anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip()
+        for text in _question_sections()[1:]
+    }
 
 
 def find_answer(topic: str) -> str | None:
@@ -42,7 +45,7 @@ def find_answer(topic: str) -> str | None:
 
 def format_answer(answer: str) -> str:
     """Format a section for a terminal, with the setup code of its examples at the end."""
-    pieces = _BLOCK.split(answer)
+    pieces = _CODE_BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
     for text, code in zip(prose, [*codes, ""], strict=True):
@@ -51,7 +54,10 @@ def format_answer(answer: str) -> str:
         ]
         parts.append(_indent(code))
     if "python" in kinds:
-        parts += ["It runs after:", _indent("".join(code for _, code in _BLOCK.findall(_sections()[0])))]
+        parts += [
+            "It runs after:",
+            _indent("".join(code for _, code in _CODE_BLOCK.findall(_question_sections()[0]))),
+        ]
     return "\n\n".join(filter(None, parts))
 
 
@@ -59,7 +65,7 @@ def make_anchor(heading: str) -> str:
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
-def _sections() -> list[str]:
+def _question_sections() -> list[str]:
     """Split docs/questions.md at its headings.
 
     The first section has the setup code of all examples.

@@ -35,7 +35,7 @@ from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import csv_value
+from urdfkin.errors.escape import csv_number_or_text
 from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 
 if TYPE_CHECKING:
@@ -46,14 +46,14 @@ _LANGUAGES_OF_SUFFIXES = {
     ".cuh": "cuda", ".cu": "cuda", ".py": "numpy", ".m": "matlab", ".tex": "latex",
 }  # fmt: skip
 #: Common names of languages and libraries, each with the name that --to accepts.
-_COMMON_NAMES = {
+_LANGUAGE_SYNONYMS = {
     "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
 }  # fmt: skip
 
 
 class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if (name := _COMMON_NAMES.get(str(value).lower())) is not None:
+        if (name := _LANGUAGE_SYNONYMS.get(str(value).lower())) is not None:
             self.fail(f"{value!r} is not the name of a language; did you mean {name}?", param, ctx)
         return super().convert(value, param, ctx)
 
@@ -126,7 +126,7 @@ def export_command(
         reject_unused_options(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
-        context.exit(_check(file))
+        context.exit(_check_exported_file(file))
     from urdfkin.export import code_in, write
     from urdfkin.export.forms import make_robot_code
 
@@ -145,7 +145,7 @@ def export_command(
     context.exit(certificate_exit_code(proof.certificate))
 
 
-def _check(file: Path) -> int:
+def _check_exported_file(file: Path) -> int:
     from urdfkin.export.check import check
 
     found = check(file)
@@ -190,7 +190,7 @@ def vectors_command() -> None:
 )
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
 @answer_command()
-def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
+def write_vectors(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
     If you name one or more robots, the command writes only the test vectors of the named robots. If you name
@@ -227,10 +227,10 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
         written += vectors.write_catalogue(folder, samples) if catalogue else []
     vectors.write_sums(folder, written)
 
-    def rows() -> Iterator[tuple[object, ...]]:
+    def csv_rows() -> Iterator[tuple[object, ...]]:
         yield "robot", "file", "numbers"
         for one in written:
-            yield csv_value(one.robot), csv_value(one.files[0].name), one.numbers
+            yield csv_number_or_text(one.robot), csv_number_or_text(one.files[0].name), one.numbers
 
     data = {
         "folder": str(folder),
@@ -239,7 +239,7 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
             for one in written
         ],
     }
-    return Answer(lambda: _document(folder, written), {"json": lambda: data, "csv": rows})
+    return Answer(lambda: _document(folder, written), {"json": lambda: data, "csv": csv_rows})
 
 
 def _document(folder: Path, written: Sequence[VectorFiles]) -> TextDocument:

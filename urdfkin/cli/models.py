@@ -29,8 +29,8 @@ from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import csv_value, json_text
-from urdfkin.system.files import exists, write_file
+from urdfkin.errors.escape import csv_number_or_text, json_text
+from urdfkin.system.files import may_exist, write_file
 
 if TYPE_CHECKING:
     from urdfkin.comparison.readers import LibraryReading
@@ -157,7 +157,7 @@ def same_command(
     robots = first, second
     with report_compilation():
         if recheck is not None:
-            return _recheck(robots, recheck)
+            return _recheck_certificate(robots, recheck)
         found = same(*robots, map=parse_joint_pairs(pairs), boxes=most_boxes, within=within)
     words = [word for pair in pairs for word in ("--map", pair)]
     words += ["--boxes", str(boxes)] if boxes is not None else []
@@ -197,7 +197,7 @@ def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> 
     return Answer(lambda: pairs_document(found, question), data, code=int(not holds))
 
 
-def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
+def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
     from urdfkin.comparison.certificate import SAME, difference_text, recheck
 
     certificate = SAME.read(path)
@@ -248,7 +248,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     check_writable(markdown)
     for source in (a, b, *more):
-        if _GIT_VERSION.fullmatch(source) and not exists(Path(source)):
+        if _GIT_VERSION.fullmatch(source) and not may_exist(Path(source)):
             remedy = "write `git show VERSION:FILE | urdfkin diff - FILE`"
             raise InputError("this is a version in git, not a file", found=source, remedy=remedy)
     robots = load_robots(a, b, *more)
@@ -264,7 +264,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     rows = [(*result.sources, *row) if more else row for result in found for row in rows_of(result)]
     data = {
         "json": lambda: {"pairs": list(map(as_data, found))} if more else as_data(found[0]),
-        "csv": lambda: [heads, *(map(csv_value, row) for row in rows)],
+        "csv": lambda: [heads, *(map(csv_number_or_text, row) for row in rows)],
         "markdown": as_markdown,
     }
     code = int(any(found))
@@ -303,24 +303,24 @@ def readers_command(robot: str, libraries: str | None, samples: int, seed: int) 
     names = None if libraries is None else [name.strip() for name in libraries.split(",")]
     found = compare_readers(loaded, names, samples=samples, seed=seed)
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["library", "version", "joint", "element", "difference", "size"]
         for reading in found:
             if reading.refused is not None:
-                yield [reading.library, reading.version, "", "", csv_value(reading.refused), ""]
+                yield [reading.library, reading.version, "", "", csv_number_or_text(reading.refused), ""]
             for difference in reading.differences:
-                words = map(csv_value, (difference.joint, difference.element, difference.words))
+                words = map(csv_number_or_text, (difference.joint, difference.element, difference.words))
                 yield [reading.library, reading.version, *words, repr(difference.size)]
 
     data = {"robot": loaded.name, "readers": [reading.as_dict() for reading in found]}
     code = int(not all(reading.agrees for reading in found))
     return Answer(
-        lambda: _readings_document(loaded.name, found), {"json": lambda: data, "csv": lines}, code=code
+        lambda: _readings_document(loaded.name, found), {"json": lambda: data, "csv": csv_rows}, code=code
     )
 
 
 def _readings_document(name: str, found: tuple[LibraryReading, ...]) -> TextDocument:
-    rows = [(f"{reading.library} {reading.version}", *_cells(reading)) for reading in found]
+    rows = [(f"{reading.library} {reading.version}", *_reading_cells(reading)) for reading in found]
     parts: list[Table | str] = [Table(("library", "poses", "joints"), rows, left=3)]
     differences = [
         (one.joint, one.element, one.words, f"{one.size:.2g}")
@@ -334,7 +334,7 @@ def _readings_document(name: str, found: tuple[LibraryReading, ...]) -> TextDocu
     return TextDocument(f"{name}: how other libraries read the file", parts)
 
 
-def _cells(reading: LibraryReading) -> tuple[str, str]:
+def _reading_cells(reading: LibraryReading) -> tuple[str, str]:
     if reading.refused is not None:
         return "refused", "-"
     poses = "the same" if reading.agrees else f"off by {reading.worst:.2g}"

@@ -21,7 +21,7 @@ from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
 from urdfkin.errors.numbers import number_remedy, parse_float, parse_int
 from urdfkin.model.reference import Reference
-from urdfkin.system.files import MAX_DATA_BYTES, read_standard_input, read_text, shorten_path
+from urdfkin.system.files import MAX_DATA_BYTES, abbreviate_path, read_standard_input, read_text
 from urdfkin.verify.oracles import ORACLES
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def format_from_suffix(
         if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
-                where=shorten_path(output),
+                where=abbreviate_path(output),
                 remedy=f"use {', '.join(formats)}, or add --format",
             )
         return format_ if chosen else default_format
@@ -116,7 +116,7 @@ def combine(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
     return decorate
 
 
-_LOAD_OPTIONS = "urdfkin.load_options"
+_LOAD_OPTIONS_KEY = "urdfkin.load_options"
 
 
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
@@ -125,17 +125,17 @@ def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bo
     If `always` is true, the callback stores a value even if the user does not give the option.
     """
 
-    def store(context: click.Context, _: click.Parameter, value: Any) -> None:
+    def store_option(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):
-            context.meta.setdefault(_LOAD_OPTIONS, {})[name] = value if read is None else read(value)
+            context.meta.setdefault(_LOAD_OPTIONS_KEY, {})[name] = value if read is None else read(value)
 
-    return store
+    return store_option
 
 
 def _make_pair_reader(
     separator: str, form: str, *, needs_value: bool
 ) -> Callable[[Sequence[str]], dict[str, str]]:
-    def read(words: Sequence[str]) -> dict[str, str]:
+    def read_pairs(words: Sequence[str]) -> dict[str, str]:
         pairs = {}
         for word in words:
             name, found, value = word.partition(separator)
@@ -144,11 +144,11 @@ def _make_pair_reader(
             pairs[name] = value
         return pairs
 
-    return read
+    return read_pairs
 
 
 def load_options() -> dict[str, Any]:
-    return dict(click.get_current_context().meta.get(_LOAD_OPTIONS, {}))
+    return dict(click.get_current_context().meta.get(_LOAD_OPTIONS_KEY, {}))
 
 
 source_options = combine(
@@ -309,14 +309,14 @@ def trajectory_option(help_: str) -> Callable[[_F], _F]:
 def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
     """Make the option --schema, which prints the JSON Schema of `layout` ("module:name")."""
 
-    def show(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    def print_schema(context: click.Context, _: click.Parameter, wanted: bool) -> None:
         if wanted and not context.resilient_parsing:
             module, name = layout.split(":")
             click.echo(getattr(importlib.import_module(module), name).schema_text(), nl=False)
             context.exit()
 
     help_ = f"Print the JSON Schema of {what} and exit."
-    return click.option("--schema", is_flag=True, expose_value=False, callback=show, help=help_)
+    return click.option("--schema", is_flag=True, expose_value=False, callback=print_schema, help=help_)
 
 
 def find_conversion(robot: Robot, name: str | None) -> Conversion | None:
@@ -327,12 +327,12 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
     from urdfkin.robot.trajectory import read_trajectory
 
     motion = read_trajectory(robot, path, convention=convention)
-    warn_of_motion(motion)
+    print_trajectory_notes(motion)
     warn_of_limits(robot, motion.q)
     return motion
 
 
-def warn_of_motion(motion: Trajectory) -> None:
+def print_trajectory_notes(motion: Trajectory) -> None:
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates_source != "as given":
@@ -388,7 +388,7 @@ class Inputs:
     def velocity_names(self) -> tuple[str, ...]:
         return (self.conversion or self.robot).velocity_names
 
-    def convert_inputs(self) -> Inputs:
+    def convert_to_given_convention(self) -> Inputs:
         if self.conversion is None:
             return self
         q, v, a = self.conversion.to(self.q, self.v, self.a)
@@ -399,7 +399,7 @@ class Inputs:
 
 
 #: The family of findings about masses, shapes and colours.
-_NOT_KINEMATICS = "URDF7"
+_NON_KINEMATIC_FINDINGS = "URDF7"
 
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
@@ -409,7 +409,7 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = load(source, **load_options() | how, verify=verify, oracle=oracle)
-    without_effect = {str(one) for one in robot.findings if one.code.startswith(_NOT_KINEMATICS)}
+    without_effect = {str(one) for one in robot.findings if one.code.startswith(_NON_KINEMATIC_FINDINGS)}
     for warning in caught:
         if str(warning.message) in without_effect:
             continue
@@ -424,7 +424,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
     if sources.count("-") > 1:
         raise click.UsageError("only one of the robots can come from standard input")
 
-    def without_options_of_others(source: str) -> dict[str, Any]:
+    def disabled_options(source: str) -> dict[str, Any]:
         """Return arguments of `load` that disable options for file types other than that of `source`.
 
         If another source is a xacro file but `source` is not, the xacro options are disabled for `source`.
@@ -437,7 +437,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
             none |= {"variant": {}, "articulation": None}
         return none
 
-    return tuple(load_robot(source, **without_options_of_others(source)) for source in sources)
+    return tuple(load_robot(source, **disabled_options(source)) for source in sources)
 
 
 def read_inputs(
@@ -553,12 +553,12 @@ def _read_stdin() -> str:
 
 # -- the motion of the root link ----------------------------------------------------------------------
 
-_POSITION = ("x", "y", "z")
-_RPY = (*_POSITION, "roll", "pitch", "yaw")
-_QUATERNION = (*_POSITION, "qx", "qy", "qz", "qw")
-_RATES = ("vx", "vy", "vz", "wx", "wy", "wz")
+_POSITION_NAMES = ("x", "y", "z")
+_RPY_POSE_NAMES = (*_POSITION_NAMES, "roll", "pitch", "yaw")
+_QUATERNION_POSE_NAMES = (*_POSITION_NAMES, "qx", "qy", "qz", "qw")
+_SIX_VECTOR_NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
-_BASE_OPTIONS = {
+_BASE_MOTION_OPTIONS = {
     "q": click.option(
         "--base-placement",
         metavar="VALUES",
@@ -580,15 +580,15 @@ _BASE_OPTIONS = {
 }
 
 
-def base_options(inputs: str) -> Callable[[_F], _F]:
+def base_motion_options(inputs: str) -> Callable[[_F], _F]:
     """Make the options for the motion of the root link.
 
     `inputs` contains q for the pose, v for the velocity and a for the acceleration.
     """
-    return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
+    return combine(*(_BASE_MOTION_OPTIONS[letter] for letter in inputs))
 
 
-def with_base(
+def with_base_motion(
     x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
 ) -> Inputs:
     from urdfkin.model.base_motion import BaseMotion
@@ -596,9 +596,11 @@ def with_base(
     if placement is None and velocity is None and acceleration is None:
         return x
     still = "0,0,0,0,0,0"
-    T = _placements(*_read_rows(placement or still, "--base-placement", (_RPY, _QUATERNION)))
-    v, _ = _read_rows(velocity or still, "--base-velocity", (_RATES,))
-    a, _ = _read_rows(acceleration or still, "--base-acceleration", (_RATES,))
+    T = _placements(
+        *_read_rows(placement or still, "--base-placement", (_RPY_POSE_NAMES, _QUATERNION_POSE_NAMES))
+    )
+    v, _ = _read_rows(velocity or still, "--base-velocity", (_SIX_VECTOR_NAMES,))
+    a, _ = _read_rows(acceleration or still, "--base-acceleration", (_SIX_VECTOR_NAMES,))
     problem = "the batches of q, v, a and the base motion have different lengths"
     q, v_, a_, *base = _repeat_single(problem, [x.q, x.v, x.a, T, v, a])
     names = "base_placement", "base_velocity", "base_acceleration"
@@ -624,6 +626,6 @@ def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:
     from urdfkin.kinematics.rotation import rotation_from_quaternion, rotation_from_rpy
 
     T: FloatArray = np.tile(np.eye(4), (len(rows), 1, 1))
-    rotation = rotation_from_quaternion if names is _QUATERNION else rotation_from_rpy
+    rotation = rotation_from_quaternion if names is _QUATERNION_POSE_NAMES else rotation_from_rpy
     T[:, :3, :3], T[:, :3, 3] = rotation(rows[:, 3:]), rows[:, :3]
     return T

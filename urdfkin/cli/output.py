@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from urdfkin.cli.options import FILE, combine, format_from_suffix
-from urdfkin.cli.streams import say, say_file
+from urdfkin.cli.streams import say, say_file_content
 from urdfkin.errors import SourceError
 from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import csv_text, json_text
@@ -155,14 +155,14 @@ def report_compilation() -> Iterator[None]:
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
 
-    def report(name: str, seconds: float | None) -> None:
+    def print_compile_event(name: str, seconds: float | None) -> None:
         if seconds is None:
             hint = hints.pop() if hints else ""
             say(f"urdfkin: compiling {name} for this machine{hint} ...", err=True)
         else:
             say(f"urdfkin: compiled {name} in {seconds:.1f} s", err=True)
 
-    with listen_to_compile_events(report):
+    with listen_to_compile_events(print_compile_event):
         yield
 
 
@@ -180,7 +180,7 @@ def write_output(data: bytes | str, output: Path | None) -> None:
     if output is not None:
         write_file(output, data.encode() if isinstance(data, str) else data)
     elif isinstance(data, str):
-        say_file(data)
+        say_file_content(data)
     else:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
@@ -210,27 +210,27 @@ def format_count(n: int, noun: str) -> str:
 
 
 def format_check_line(certificate: Certificate) -> str:
-    by = certificate.oracle
+    oracle = certificate.oracle
     if certificate.not_verified:
-        return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
+        return f"NOT VERIFIED by {oracle}: {'; '.join(certificate.not_verified)}"
     parts = [
         f"{format_count(line.checked, f'{line.quantity} result')}, worst disagreement"
         f" {line.worst:.2g} eps*scale ({line.bound_ratio:.1%} of the bound)"
         for line in certificate.lines
     ]
-    return f"verified by {by}: {'; '.join(parts)}"
+    return f"verified by {oracle}: {'; '.join(parts)}"
 
 
 def certificate_exit_code(certificate: Certificate) -> int:
     return 0 if certificate.verified else 3
 
 
-def format_path_check(check: object | None) -> tuple[str, int]:
+def format_pinocchio_check(check: object | None) -> tuple[str, int]:
     """Return the line that states the result of Pinocchio's check, and the exit code of the command.
 
     `check` is the result of the check, or None if nothing was checked.
     """
     from urdfkin.verify.pinocchio import version
 
-    by = f"Pinocchio {version()}"
-    return (f"NOT VERIFIED by {by}", 3) if check is None else (f"{by}: {check}", 0)
+    oracle = f"Pinocchio {version()}"
+    return (f"NOT VERIFIED by {oracle}", 3) if check is None else (f"{oracle}: {check}", 0)

@@ -27,7 +27,7 @@ from urdfkin.cli.options import (
     seed_option,
     verify_option,
 )
-from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, format_path_check
+from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, format_pinocchio_check
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument, format_number
 from urdfkin.errors.escape import csv_cell
@@ -81,7 +81,7 @@ def chain_command(
         return _with_locked_joints(TextDocument(title, [Table(heads, rows, left=5, names=(0,))]), loaded)
 
     def data() -> dict[str, Any]:
-        converted = inputs.convert_inputs()
+        converted = inputs.convert_to_given_convention()
         return {
             "robot": loaded.name,
             "source": loaded.source,
@@ -106,14 +106,14 @@ def chain_command(
             "placement": path.placement(path_q).tolist(),
         }
 
-    def rows() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["i", "joint", "kind", "backwards", *(f"{name}{axis}" for name in "zOd" for axis in "xyz")]
         for i, (joint, *vectors) in enumerate(joints, 1):
             numbers = [repr(x) for vector in vectors for x in vector.tolist()]
             yield [i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers]
 
     check = check_chain(loaded.verifier, path, inputs.q) if verify else None
-    return Answer(document, {"json": data, "csv": rows}, *format_path_check(check))
+    return Answer(document, {"json": data, "csv": csv_rows}, *format_pinocchio_check(check))
 
 
 def _kind_of_joint(joint: Any) -> str:
@@ -126,7 +126,7 @@ def _vector(numbers: FloatArray) -> str:
 
 
 SCREW_FORMATS = ("terminal", "markdown", "html", "latex", "toml", "json", "numpy", "matlab")
-_SUFFIXES = {
+_SCREW_SUFFIXES = {
     ".txt": ("terminal",), ".md": ("markdown",), ".html": ("html",), ".tex": ("latex",), ".toml": ("toml",),
     ".json": ("json",), ".py": ("numpy",), ".m": ("matlab",),
 }  # fmt: skip
@@ -137,7 +137,7 @@ _SUFFIXES = {
 @path_options
 @digits_option
 @verify_option
-@answer_command(*SCREW_FORMATS, suffixes=_SUFFIXES)
+@answer_command(*SCREW_FORMATS, suffixes=_SCREW_SUFFIXES)
 def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
     """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
@@ -161,7 +161,9 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     mapping = {**screws.as_mapping(), **lock_settings(loaded)}
     data["json"] = lambda: json.dumps(mapping, indent=2) + "\n"
     return Answer(
-        lambda: _with_locked_joints(screws_document(screws, digits), loaded), data, *format_path_check(check)
+        lambda: _with_locked_joints(screws_document(screws, digits), loaded),
+        data,
+        *format_pinocchio_check(check),
     )
 
 
@@ -202,13 +204,15 @@ def structure_command(
         found = find_structure(screws)
         data = {"json": lambda: as_json_data(found) | lock_settings(loaded)}
         return Answer(
-            lambda: _with_locked_joints(_structure_document(found), loaded), data, *format_path_check(check)
+            lambda: _with_locked_joints(_structure_document(found), loaded),
+            data,
+            *format_pinocchio_check(check),
         )
     path = loaded.chain(tip, base)
     parameters = find_opw(path, opw / 1e3)
     check = check_opw(loaded.verifier, path, parameters) if verify else None
     yaml = "".join(f"{key}: {json.dumps(value)}\n" for key, value in parameters.as_mapping().items())
-    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *format_path_check(check))
+    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *format_pinocchio_check(check))
 
 
 def _with_locked_joints(document: TextDocument, robot: Robot) -> TextDocument:

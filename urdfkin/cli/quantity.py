@@ -19,7 +19,7 @@ from urdfkin.cli.options import (
     Inputs,
     NumberInRange,
     a_option,
-    base_options,
+    base_motion_options,
     combine,
     convention_option,
     find_conversion,
@@ -28,6 +28,7 @@ from urdfkin.cli.options import (
     load_robot,
     lock_settings,
     oracle_option,
+    print_trajectory_notes,
     q_option,
     read_inputs,
     reference_option,
@@ -38,8 +39,7 @@ from urdfkin.cli.options import (
     v_option,
     verify_option,
     warn_of_limits,
-    warn_of_motion,
-    with_base,
+    with_base_motion,
 )
 from urdfkin.cli.output import (
     TEXT_FORMATS,
@@ -69,19 +69,19 @@ if TYPE_CHECKING:
     from urdfkin.verify.singular_values import SingularValues
 
 _F = TypeVar("_F", bound=Callable[..., Any])
-_VALUE_OPTIONS = {"q": q_option, "v": v_option, "a": a_option}
-_BASE = ("base_placement", "base_velocity", "base_acceleration")
-_trajectory = trajectory_option(
+_JOINT_VALUE_OPTIONS = {"q": q_option, "v": v_option, "a": a_option}
+_BASE_MOTION_OPTION_NAMES = ("base_placement", "base_velocity", "base_acceleration")
+_trajectory_option = trajectory_option(
     "Read q, v and a from this file instead of --q, --v and --a. CSV output has one row for each time."
 )
 _MAX_SAMPLES = 5
 
 
 def quantity_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
-    values = (_VALUE_OPTIONS[letter] for letter in inputs)
+    values = (_JOINT_VALUE_OPTIONS[letter] for letter in inputs)
     return combine(
-        *(robot_argument, frame_option, *own, convention_option, *values, _trajectory),
-        *(base_options(inputs), seed_option, verify_option, oracle_option(), *last),
+        *(robot_argument, frame_option, *own, convention_option, *values, _trajectory_option),
+        *(base_motion_options(inputs), seed_option, verify_option, oracle_option(), *last),
         answer_command(*TEXT_FORMATS, "json", "csv", "npy"),
     )
 
@@ -95,7 +95,7 @@ def _read_options() -> Inputs:
         inputs = _read_trajectory(robot, options["frame"], options["trajectory"], "".join(values), conversion)
     else:
         inputs = read_inputs(robot, options["frame"], options["seed"], **values, conversion=conversion)
-    return with_base(inputs, *map(options.get, _BASE))
+    return with_base_motion(inputs, *map(options.get, _BASE_MOTION_OPTION_NAMES))
 
 
 def _read_trajectory(
@@ -109,14 +109,14 @@ def _read_trajectory(
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
     x = read_samples(robot, path, conversion)
     if x.base is not None:
-        reject_unused_options(context, _BASE, "along a --trajectory with a moving base")
+        reject_unused_options(context, _BASE_MOTION_OPTION_NAMES, "along a --trajectory with a moving base")
     settings = lock_settings(robot)
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
         motion = complete_rates(robot.tree, x)
         q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
         settings["derivatives"] = motion.rates_source
-        warn_of_motion(motion)
+        print_trajectory_notes(motion)
     warn_of_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
     frame = frame or robot.tip_frame
@@ -139,22 +139,22 @@ def _verified_answer(
 
 
 def _format_samples(
-    x: Inputs, max_samples: int, other_formats: str, of: Callable[[int], Iterable[str | Table]]
+    x: Inputs, max_samples: int, other_formats: str, make_parts: Callable[[int], Iterable[str | Table]]
 ) -> Iterator[str | Table]:
     n = len(x.q)
     for k in range(min(n, max_samples)):
         if n > 1:
             yield f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
-        yield from of(k)
+        yield from make_parts(k)
     if n > max_samples:
         yield f"... and {n - max_samples} more samples: --format {other_formats} writes all"
 
 
-_ROBOT = (
+_ROBOT_HELP = (
     "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may"
     " also be a Denavit-Hartenberg table: .toml, .json or .csv."
 )
-_breakdown = click.option(
+_breakdown_option = click.option(
     "--breakdown",
     is_flag=True,
     help="Print the contribution of each joint to the acceleration, split into terms such as Coriolis.",
@@ -166,7 +166,7 @@ def make_command(quantity: Quantity) -> click.Command:
 
     own = [reference_option] if quantity.has_reference else []
 
-    @quantity_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
+    @quantity_options(quantity.inputs, *own, last=(_breakdown_option,) if has_breakdown else ())
     def compute(*, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any) -> Answer:
         if breakdown:
             reject_unused_options(click.get_current_context(), ("convention",), "with --breakdown")
@@ -183,7 +183,7 @@ def make_command(quantity: Quantity) -> click.Command:
         return _answer(x, quantity, result, reference if quantity.has_reference else None)
 
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
-    compute.__doc__ = f"{summary}\n\n{quantity.help_text}\n\n{_ROBOT}"
+    compute.__doc__ = f"{summary}\n\n{quantity.help_text}\n\n{_ROBOT_HELP}"
     return click.command(quantity.command, epilog=f"Example: {quantity.example}")(compute)
 
 
@@ -191,7 +191,7 @@ def make_command(quantity: Quantity) -> click.Command:
 
 
 def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
-    x = x.convert_inputs()
+    x = x.convert_to_given_convention()
     if x.conversion and x.conversion.angular_first and quantity.labels == SIX_VECTOR_LABELS:
         units = dict(reversed(list(quantity.units.items())))
         quantity = replace(quantity, labels=(*SIX_VECTOR_LABELS[3:], *SIX_VECTOR_LABELS[:3]), units=units)
@@ -250,23 +250,23 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         if quantity.has_columns:
             several = product(names, *[x.velocity_names] * (quantity.axes - 1))
             names = [csv_cell(" ".join(words)) for words in several]
-        yield [_TIME[x.t is not None], *names]
-        samples = zip(_times(x), result.reshape(len(result), -1).tolist(), strict=True)
+        yield [_SAMPLE_HEADINGS[x.t is not None], *names]
+        samples = zip(_sample_cells(x), result.reshape(len(result), -1).tolist(), strict=True)
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
 #: Possible headings of the first column of CSV output.
 #: The heading is "t" if the samples have times, otherwise "sample".
-_TIME = ("sample", "t")
+_SAMPLE_HEADINGS = ("sample", "t")
 
 
-def _times(x: Inputs) -> Iterable[object]:
+def _sample_cells(x: Inputs) -> Iterable[object]:
     return range(len(x.q)) if x.t is None else map(repr, x.t.tolist())
 
 
 def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
     if quantity.has_columns:
-        return _columns(quantity, x.velocity_names, value)
+        return _jacobian_column_table(quantity, x.velocity_names, value)
     if not quantity.units:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
@@ -280,7 +280,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
     return Table(("", "x", "y", "z"), [(name, *row) for name, row in rows])
 
 
-def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
+def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
     For a Hessian, each row has the derivative of one column of the Jacobian with respect to one joint
@@ -320,9 +320,9 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         )
         yield from _format_samples(x, 2, "csv, json or npy", table)
 
-    def rows() -> Iterator[list[object]]:
-        yield [_TIME[x.t is not None], "joint", "kind", *SIX_VECTOR_LABELS]
-        for k, t in enumerate(_times(x)):
+    def csv_rows() -> Iterator[list[object]]:
+        yield [_SAMPLE_HEADINGS[x.t is not None], "joint", "kind", *SIX_VECTOR_LABELS]
+        for k, t in enumerate(_sample_cells(x)):
             for joint, kind, six in found.contributions((k,)):
                 yield [t, csv_cell(joint), kind, *map(repr, six.tolist())]
             yield [t, "sum", "", *map(repr, found.total[k].tolist())]
@@ -339,14 +339,14 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         }
 
     title = f"acceleration of {x.frame}, {reference}, by joint"
-    return _verified_answer(x, title, parts, json=data, csv=rows, npy=lambda: found.terms)
+    return _verified_answer(x, title, parts, json=data, csv=csv_rows, npy=lambda: found.terms)
 
 
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
 #: Choices of `placement --as` except matrix
-_FORMS = {
+_POSE_FORMS = {
     name: replace(
         PLACEMENT,
         shape=(3 + len(names),),
@@ -368,7 +368,7 @@ _FORMS = {
     click.option(
         "--as",
         "form",
-        type=click.Choice(["matrix", *_FORMS]),
+        type=click.Choice(["matrix", *_POSE_FORMS]),
         default="matrix",
         help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
         " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
@@ -396,7 +396,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
     if form == "matrix":
         return _answer(x, PLACEMENT, T)
     x = x.with_settings(written_as=form)
-    return _answer(x, _FORMS[form], _convert_poses(x, T, form, verify=verify))
+    return _answer(x, _POSE_FORMS[form], _convert_poses(x, T, form, verify=verify))
 
 
 def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> FloatArray:
@@ -429,8 +429,13 @@ def _replay_command(x: Inputs, k: int, form: str) -> str:
 
 
 #: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
-_TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
-REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
+_EULER_SEQUENCES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
+REPRESENTATIONS = (
+    "rpy",
+    "quaternion",
+    *(sequence.upper() for sequence in _EULER_SEQUENCES),
+    *_EULER_SEQUENCES,
+)
 
 
 @click.command(
@@ -532,7 +537,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
 )
 @convention_option
 @q_option
-@_trajectory
+@_trajectory_option
 @seed_option
 @verify_option
 @answer_command()
@@ -559,11 +564,13 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
         gradient = found.manipulability_gradient(x.robot.hessian(x.q, x.frame, base=x.base))
     if x.conversion is not None:
         gradient = x.conversion.columns(x.q, gradient[:, None])[:, 0]
-    x = x.convert_inputs()
+    x = x.convert_to_given_convention()
     names = [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
 
     def parts(k: int) -> Iterator[str | Table]:
-        lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _iterate_bounds(names, found, k)]
+        lines = [
+            (name, *(f"{n:.15g}" for n in sides)) for name, sides in _values_with_bounds(names, found, k)
+        ]
         yield Table(("", "value", "lower bound", "upper bound"), lines)
         if singularity := found.singularity(k):
             # At a singularity, the manipulability may have no derivative.
@@ -591,22 +598,26 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             ],
         }
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         sides = ("", " lower", " upper")
         heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
-        yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.velocity_names)]
-        for k, (t, slopes) in enumerate(zip(_times(x), gradient.tolist(), strict=True)):
-            numbers = [n for _, sides in _iterate_bounds(names, found, k) for n in sides]
+        yield [
+            _SAMPLE_HEADINGS[x.t is not None],
+            *heads,
+            *(csv_cell(f"by {rate}") for rate in x.velocity_names),
+        ]
+        for k, (t, slopes) in enumerate(zip(_sample_cells(x), gradient.tolist(), strict=True)):
+            numbers = [n for _, sides in _values_with_bounds(names, found, k) for n in sides]
             yield [t, *map(repr, numbers), *map(repr, slopes)]
 
     settings = "".join(f", {name} {word}" for name, word in x.settings.items() if isinstance(word, str))
     title = f"singular values of {x.frame}, {rows} rows{settings}"
     return _verified_answer(
-        x, title, lambda: _format_samples(x, _MAX_SAMPLES, "csv or json", parts), json=data, csv=lines
+        x, title, lambda: _format_samples(x, _MAX_SAMPLES, "csv or json", parts), json=data, csv=csv_rows
     )
 
 
-def _iterate_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
+def _values_with_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
     """Yield name and [value, lower bound, upper bound] of each quantity of sample `k`."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-FILES = ("json_", "html", "junit", "markdown")
+REPORT_FILE_OPTIONS = ("json_", "html", "junit", "markdown")
 report_options = combine(
     click.option("--json", "json_", type=FILE, help="Write the report to this file as JSON."),
     click.option(
@@ -55,12 +55,14 @@ def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
 
     If a file cannot be written, the exit code is that of the first such error. Otherwise, the exit code is 0.
     """
-    codes = [_write(document, name, path) for name in FILES if (path := files[name]) is not None]
+    codes = [
+        _write(document, name, path) for name in REPORT_FILE_OPTIONS if (path := files[name]) is not None
+    ]
     return next(filter(None, codes), 0)
 
 
 def say_written(files: Mapping[str, Path | None]) -> None:
-    if written := [str(files[name]) for name in FILES if files[name]]:
+    if written := [str(files[name]) for name in REPORT_FILE_OPTIONS if files[name]]:
         say(f"wrote {', '.join(written)}")
 
 
@@ -123,7 +125,7 @@ def report_command() -> None:
 @report_options
 @schema_option("urdfkin.validation.document:VALIDATION", "a report")
 @click.pass_context
-def show(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
+def show_report(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
     """Show a report, or convert it to HTML, JUnit or Markdown.
 
     The argument is the JSON file of `urdfkin validate --json FILE`, or the folder DIR of `--store DIR`. The

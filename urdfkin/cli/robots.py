@@ -15,7 +15,7 @@ import click
 from urdfkin.cli.options import load_robot, robot_argument
 from urdfkin.cli.output import Answer, answer_command
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import csv_cell, csv_value
+from urdfkin.errors.escape import csv_cell, csv_number_or_text
 from urdfkin.system.lazy_import import lazy_import
 from urdfkin.urdf.catalogue import CatalogueEntry, catalogue
 
@@ -86,7 +86,7 @@ def info_command(robot: str) -> Answer:
     loaded = load_robot(robot)
     data = {
         "json": lambda: _describe(loaded),
-        "csv": lambda: _rows(loaded._text_document(), loaded.tree.links),
+        "csv": lambda: _link_rows(loaded._text_document(), loaded.tree.links),
     }
     return Answer(
         loaded._text_document, data, fit_document=lambda out: _fit_to_terminal(out, loaded._text_document())
@@ -106,15 +106,15 @@ def _fit_to_terminal(out: Console, document: TextDocument) -> TextDocument:
     return replace(document, parts=parts)
 
 
-def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
+def _link_rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)
             for link, (_, *cells) in zip(links, part.rows, strict=True):
-                yield [csv_cell(link), *(csv_value(str(cell)) for cell in cells)]
+                yield [csv_cell(link), *(csv_number_or_text(str(cell)) for cell in cells)]
 
 
-_NO_ORDER = (
+_UNKNOWN_ORDER_NOTE = (
     "The joint order of idyntree follows no known rule; give it as robot.convention('idyntree', joints=[...])"
     ", or as `joints` in a TOML file"
 )
@@ -147,7 +147,7 @@ def _orders(robot: Robot) -> Answer:
     found = {
         name: robot.convention(name) for name in BUILT_IN_NAMES if find_convention(name).order != "given"
     }
-    cells = {name: _cells(robot, conversion) for name, conversion in found.items()}
+    cells = {name: _index_cells(robot, conversion) for name, conversion in found.items()}
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, column in cells.items():
         groups.setdefault(column, []).append(name)
@@ -157,18 +157,20 @@ def _orders(robot: Robot) -> Answer:
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
         title = f"{robot.name}: index of each joint in q; 7/6 means index 7 in q and index 6 in v"
-        return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
+        return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _UNKNOWN_ORDER_NOTE])
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["joint", *cells]
         for name, *row in zip(robot.joint_names, *cells.values(), strict=True):
             yield [csv_cell(name), *row]
 
     conventions = {name: _convention_data(conversion) for name, conversion in found.items()}
-    return Answer(document, {"json": lambda: {"robot": robot.name, "conventions": conventions}, "csv": lines})
+    return Answer(
+        document, {"json": lambda: {"robot": robot.name, "conventions": conventions}, "csv": csv_rows}
+    )
 
 
-def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
+def _index_cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return one text for each joint: the indices of the joint in q and v.
 
     The text is the joint's index in q, for example "7", or the joint's first and last index, "7-13". If the
@@ -180,13 +182,13 @@ def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     def span(found: list[int]) -> str:
         return str(found[0]) if len(found) == 1 else f"{found[0]}-{found[-1]}"
 
-    def cell(name: str) -> str:
+    def index_cell(name: str) -> str:
         if name not in indices:
             return "-"
         q, v = map(span, indices[name])
         return q if q == v else f"{q}/{v}"
 
-    return tuple(map(cell, robot.joint_names))
+    return tuple(map(index_cell, robot.joint_names))
 
 
 def _convention_data(conversion: Conversion) -> dict[str, Any]:
@@ -211,7 +213,7 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
     found = {letter: find_reordering(letter, start, end) for letter in "qv"}
     names = {"q": end.coordinate_names, "v": end.velocity_names}
 
-    def code() -> Iterator[str]:
+    def code_lines() -> Iterator[str]:
         for letter, one in found.items():
             if one is not None:
                 yield one.code(f"{letter}_to", f"{letter}_from")
@@ -235,11 +237,11 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
             document[letter] = {"names": list(names[letter]), "reordering": entry}
         return document
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["what", "name", "index", "factor", "zero"]
         for letter, one in found.items():
             if one is not None:
                 cells = zip(names[letter], one.index, map(repr, one.factor), map(repr, one.zero), strict=True)
                 yield from ([letter, csv_cell(name), *more] for name, *more in cells)
 
-    return Answer(lambda: TextDocument("", list(code())), {"json": data, "csv": lines})
+    return Answer(lambda: TextDocument("", list(code_lines())), {"json": data, "csv": csv_rows})

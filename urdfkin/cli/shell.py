@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 from click.shell_completion import CompletionItem, get_completion_class
 
-from urdfkin.cli.streams import say, say_file
+from urdfkin.cli.streams import say, say_file_content
 from urdfkin.errors import SourceError, UrdfkinError
 from urdfkin.urdf.catalogue import catalogue
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 #: Pattern of the names that completion offers.
 #: Names without characters that a shell interprets.
 #: Bash separates words at colons, so names with colons do not match.
-_HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
+_SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
-_MOST_BYTES = 10_000_000
+_MAX_BYTES = 10_000_000
 #: XML elements that define frames. In a URDF, only elements directly below <robot> define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
@@ -71,7 +71,7 @@ def _items(names: Iterable[str], incomplete: str) -> Items:
     return [
         CompletionItem(name)
         for name in names
-        if name.startswith(incomplete) and _HARMLESS.fullmatch(name) is not None
+        if name.startswith(incomplete) and _SAFE_NAME.fullmatch(name) is not None
     ]
 
 
@@ -83,7 +83,7 @@ def _frames(word: str) -> Iterator[str]:
     if is_xacro(word) or not (word in catalogue() or Path(word).expanduser().is_file()):
         return
     try:
-        text = read_source(word, _MOST_BYTES)
+        text = read_source(word, _MAX_BYTES)
         root = read_document(Reporter(text.label, text.data))
     except (UrdfkinError, OSError):
         return
@@ -116,7 +116,7 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
     """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
     script = get_completion_class(shell)
     # The variable _URDFKIN_COMPLETE makes click print completions.
-    say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())
+    say_file_content(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())
 
 
 @click.command(epilog="Example: urdfkin warm")
@@ -142,10 +142,10 @@ def warm_command() -> None:
         )
     begin, before = time.perf_counter(), set(folder.glob("*.kernel"))
 
-    def report(name: str, seconds: float | None) -> None:
+    def print_compile_event(name: str, seconds: float | None) -> None:
         say(f"compiling {name} ..." if seconds is None else f"compiled {name} in {seconds:.1f} s", err=True)
 
-    with listen_to_compile_events(report):
+    with listen_to_compile_events(print_compile_event):
         load_kernels()
         for kernel in (kernels.hessians, kernels.imus, one_configuration):
             _ = kernel.compiled_function

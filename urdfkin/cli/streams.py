@@ -140,30 +140,30 @@ class SafeStream:
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
         # Control characters and CI commands are escaped only between the escape sequences for colours.
-        pieces[::2] = [self._without_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
+        pieces[::2] = [self._escape_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
 
-    def write_commands(self, text: str) -> None:
+    def write_github_commands(self, text: str) -> None:
         self._write_raw(
             CI_COMMAND_ANYWHERE.sub(
                 lambda found: found[0][:-1] + escape_sequence("["), _escape_unprintable(text)
             )
         )
 
-    def write_file(self, text: str) -> None:
+    def write_file_content(self, text: str) -> None:
         self.stream.flush()
-        self.stream.buffer.write(self.escape_file(text).encode())
+        self.stream.buffer.write(self.escape_file_content(text).encode())
         self.stream.buffer.flush()
 
-    def escape_file(self, text: str) -> str:
-        """Escape control characters and CI commands in `text`, as `write_file` does.
+    def escape_file_content(self, text: str) -> str:
+        """Escape control characters and CI commands in `text`, as `write_file_content` does.
 
         A carriage return at the end of a line is not escaped.
         """
         *lines, last = text.split("\n")
         plain = [_escape_unprintable(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
-        return self._without_commands("\n".join([*plain, _escape_unprintable(last)]))
+        return self._escape_commands("\n".join([*plain, _escape_unprintable(last)]))
 
     def _write_raw(self, text: str) -> None:
         encoding = self.stream.encoding or "utf-8"
@@ -171,30 +171,32 @@ class SafeStream:
             text = text.encode(encoding, "backslashreplace").decode(encoding)
         self.stream.write(text)
 
-    def _without_commands(self, text: str) -> str:
+    def _escape_commands(self, text: str) -> str:
         """Escape CI commands in `text`.
 
         An earlier call may have written the first characters of a CI command. The rest is then in `text`.
         """
         first, *rest = text.split("\n")
-        lines = [self._line_without_commands(first)]
+        lines = [self._escape_commands_in_line(first)]
         for line in rest:
             self._line = ""
-            lines.append(self._line_without_commands(line))
+            lines.append(self._escape_commands_in_line(line))
         return "\n".join(lines)
 
-    def _line_without_commands(self, piece: str) -> str:
+    def _escape_commands_in_line(self, piece: str) -> str:
         before = len(self._line)
         whole = self._line + piece
-        at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
+        escaped_indices = [
+            m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
+        ]
         # Only the last 16 characters of a long line are stored.
         # An "x" is added in front of the characters.
         # Without the "x", a line could begin with a CI command.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (
-            "".join(escape_sequence(c) if before + k in at else c for k, c in enumerate(piece))
-            if at
+            "".join(escape_sequence(c) if before + k in escaped_indices else c for k, c in enumerate(piece))
+            if escaped_indices
             else piece
         )
 
@@ -236,15 +238,15 @@ def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
     stream.write("".join(texts) + "\n")
 
 
-def say_file(text: str) -> None:
-    SafeStream(sys.stdout).write_file(text)
+def say_file_content(text: str) -> None:
+    SafeStream(sys.stdout).write_file_content(text)
 
 
 def escape_for_terminal(text: str) -> str:
-    """Escape a text in the same way as `say_file`, but do not print the text."""
-    return SafeStream(sys.stdout).escape_file(text)
+    """Escape a text in the same way as `say_file_content`, but do not print the text."""
+    return SafeStream(sys.stdout).escape_file_content(text)
 
 
-def print_commands(text: str) -> None:
+def print_github_commands(text: str) -> None:
     """Write lines that GitHub interprets as commands, for example findings as annotations."""
-    SafeStream(sys.stdout).write_commands(text + "\n")
+    SafeStream(sys.stdout).write_github_commands(text + "\n")

@@ -10,7 +10,7 @@ from rich.console import Console
 from urdfkin.cli.streams import SafeStream
 from urdfkin.errors.escape import escape_unprintable
 
-_TRAILING = re.compile(r" +$", re.MULTILINE)
+_TRAILING_BLANKS = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
@@ -31,4 +31,4 @@ class Terminal(Console):
         # The package rich pads the lines of a table with blanks.
         with self.capture() as capture:
             super().print(*texts, **options)
-        self.file.write(_TRAILING.sub("", capture.get()))
+        self.file.write(_TRAILING_BLANKS.sub("", capture.get()))

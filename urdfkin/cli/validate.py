@@ -23,7 +23,7 @@ from urdfkin.cli.options import (
     seed_option,
 )
 from urdfkin.cli.output import check_writable, make_console, report_compilation
-from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
+from urdfkin.cli.reports import REPORT_FILE_OPTIONS, report_options, say_written, write_reports
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors import InputError, UrdfkinError
@@ -71,7 +71,7 @@ def study_all(
                 found = None if results is None else results.read(i)
                 if found is None or (retry and isinstance(found, FailedStudy)):
                     sha256 = None if results is None else results.robot_sha256(i)
-                    found, is_lasting = _study(given[i], settings, sha256, how)
+                    found, is_lasting = _study_accuracy(given[i], settings, sha256, how)
                     if results is not None and is_lasting:
                         results.write(i, found)
                 if isinstance(found, FailedStudy):
@@ -101,7 +101,7 @@ def _open_results(
         yield results
 
 
-def _study(
+def _study_accuracy(
     source: Robot | str, settings: StudySettings, sha256: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
     """Return the accuracy result of a robot, and whether to store this result.
@@ -133,13 +133,13 @@ def _study(
 _T = TypeVar("_T", bound=click.Command)
 
 
-def _with_quantities(command: _T) -> _T:
+def _list_quantities_in_help(command: _T) -> _T:
     assert command.help is not None
     command.help = command.help.format(compared=compared_titles(), not_compared=uncompared_titles())
     return command
 
 
-@_with_quantities
+@_list_quantities_in_help
 @click.command(epilog="Example: urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
 @click.option(
@@ -222,7 +222,7 @@ def validate_command(
     Exit 0: verified. 1: a disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n:
     stopped by signal n; finished results are saved.
     """
-    files = {name: options.pop(name) for name in FILES}
+    files = {name: options.pop(name) for name in REPORT_FILE_OPTIONS}
     store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
         raise click.UsageError("give either robots, or --all (every robot of example-robot-data)")
@@ -248,7 +248,7 @@ def validate_command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
-    sources = [source for robot in robots for source in _list_files(robot)] or list(example_robots())
+    sources = [source for robot in robots for source in _list_urdf_files(robot)] or list(example_robots())
     given = [_load_stdin(robot, how) if with_study else robot for robot in sources]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (
@@ -287,7 +287,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
         yield cluster
 
 
-def _list_files(robot: str) -> list[str]:
+def _list_urdf_files(robot: str) -> list[str]:
     """Return the .urdf files in a folder and its subfolders; otherwise, return only `robot`."""
     from urdfkin.urdf.lint.settings import DEFAULT_INCLUDE, Settings, find_files
 

@@ -27,7 +27,16 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import COARSE_GRID, FINE_GRID, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
-from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, as_json_data, doc, of_length
+from urdfkin.system.documents import (
+    Count,
+    DocumentKind,
+    Header,
+    NonNegativeFloat,
+    TransformRows,
+    as_json_data,
+    doc,
+    of_length,
+)
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Maximum number of boxes in memory during `recheck`.
@@ -71,8 +80,12 @@ class DifferenceEntry(TypedDict):
     ]
     a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
     b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
-    radians: Annotated[Size, doc("Angular part of the difference, radians; 0 without an angular part.")]
-    metres: Annotated[Size, doc("Linear part of the difference, metres; 0 without a linear part.")]
+    radians: Annotated[
+        NonNegativeFloat, doc("Angular part of the difference, radians; 0 without an angular part.")
+    ]
+    metres: Annotated[
+        NonNegativeFloat, doc("Linear part of the difference, metres; 0 without a linear part.")
+    ]
     detail: Annotated[
         Literal["", "alone", "converted"],
         doc(
@@ -85,8 +98,8 @@ class DifferenceEntry(TypedDict):
 class CertifiedConversion(TypedDict):
     """Pose of a planar or floating joint in B: before * (pose in A) * behind."""
 
-    before: Annotated[Matrix, doc("Matrix M (4, 4), multiplied from the left.")]
-    behind: Annotated[Matrix, doc("Matrix N (4, 4), multiplied from the right.")]
+    before: Annotated[TransformRows, doc("Matrix M (4, 4), multiplied from the left.")]
+    behind: Annotated[TransformRows, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
         doc(
@@ -114,7 +127,7 @@ class ToolEntry(TypedDict):
 
     a: Annotated[str, doc("Link of A.")]
     b: Annotated[str, doc("Link of B.")]
-    pose: Annotated[Matrix, doc("Pose of the link of B in the frame of the link of A.")]
+    pose: Annotated[TransformRows, doc("Pose of the link of B in the frame of the link of A.")]
 
 
 class Rounding(TypedDict):
@@ -123,8 +136,8 @@ class Rounding(TypedDict):
     The distance holds while planar, floating and unlimited prismatic joints travel at most 10 m.
     """
 
-    metres: Size
-    radians: Size
+    metres: NonNegativeFloat
+    radians: NonNegativeFloat
 
 
 class FrameEntry(TypedDict):
@@ -133,27 +146,29 @@ class FrameEntry(TypedDict):
     frame: Annotated[str, doc("Link of A.")]
     frame_b: Annotated[str, doc("Link of B.")]
     lower: Annotated[
-        Size,
+        NonNegativeFloat,
         doc(
             "Lower bound of the largest distance, metres: the computed distance if A is at `q_a` and B is at"
             " `q_b`, minus the largest rounding error."
         ),
     ]
     upper: Annotated[
-        Size | None,
+        NonNegativeFloat | None,
         doc(
             "Proven upper bound of the distance in all configurations within limits, metres; null if none is"
             " proven."
         ),
     ]
     radians: Annotated[
-        Size | None,
+        NonNegativeFloat | None,
         doc(
             "Proven upper bound of the angle in all configurations within limits, radians; null if none is"
             " proven."
         ),
     ]
-    radians_seen: Annotated[Size, doc("Angle between the orientations at `q_a` and `q_b`, radians.")]
+    radians_seen: Annotated[
+        NonNegativeFloat, doc("Angle between the orientations at `q_a` and `q_b`, radians.")
+    ]
     q_a: Annotated[list[float], doc("Configuration of A; empty if the frame does not differ.")]
     q_b: Annotated[list[float], doc("Configuration of B that corresponds to `q_a`.")]
 
@@ -164,7 +179,7 @@ class Confirmed(TypedDict):
     state: Annotated[ConfirmationState, doc("Whether the oracle confirmed the bounds.")]
     by: Annotated[str, doc("Name and version of the oracle; empty if the oracle did not check the bounds.")]
     configurations: Annotated[Count, doc("Number of configurations at which the oracle checked the bounds.")]
-    metres: Annotated[Size, doc("Largest distance that the oracle computed, metres.")]
+    metres: Annotated[NonNegativeFloat, doc("Largest distance that the oracle computed, metres.")]
     reason: Annotated[str, doc("Reason why the oracle computed no distances; empty if it computed them.")]
 
 
@@ -194,7 +209,7 @@ class SameCertificate(Header):
     orders: Annotated[
         list[list[str]], doc("Consecutive joints of B whose order was changed, in the new order.")
     ]
-    base: Annotated[Matrix, doc("Pose of B's root link in A's root frame, in the zero configuration.")]
+    base: Annotated[TransformRows, doc("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
         list[str], of_length(2), doc("Poses are compared relative to these links of A and B.")
     ]

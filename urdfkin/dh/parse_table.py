@@ -27,10 +27,10 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, to_plain_text
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
-from urdfkin.errors.numbers import UNITS
+from urdfkin.errors.numbers import UNIT_SHORT_NAMES
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import ROUNDED, polar_factor
-from urdfkin.system.files import exists, read_text
+from urdfkin.system.files import may_exist, read_text
 from urdfkin.system.resources import robots_dir
 
 #: Tolerance of a rotation that is printed with six digits.
@@ -264,9 +264,9 @@ def _parse_column(heading: str) -> _Column:
     text = to_plain_text(heading).strip("*` ")
     unit = None
     if found := re.search(
-        r"[\[(/]\s*(" + "|".join(sorted(UNITS, key=len, reverse=True)) + r")\s*[\])]?\s*$", text
+        r"[\[(/]\s*(" + "|".join(sorted(UNIT_SHORT_NAMES, key=len, reverse=True)) + r")\s*[\])]?\s*$", text
     ):
-        unit, text = UNITS[found[1]], text[: found.start()]
+        unit, text = UNIT_SHORT_NAMES[found[1]], text[: found.start()]
     previous = re.search(r"[ijkn]\s*-\s*1", text) is not None
     text = re.sub(r"[_(\s{]*[ijkn]?\s*(?:-\s*1)?[\s)}]*$", "", text) if previous or "_" in text else text
     text = (
@@ -542,7 +542,7 @@ def suggest_published_tables(robot: str) -> list[str]:
 def reference_path(name: str) -> Path:
     """`name` is a path or a published table's name."""
     path = Path(name)
-    if path.suffix or exists(path):
+    if path.suffix or may_exist(path):
         return path
     files = published_tables()
     if name not in files:

@@ -17,7 +17,7 @@ from fractions import Fraction
 from numbers import Real
 
 from urdfkin.errors import InputError
-from urdfkin.errors.numbers import UNITS, radians_from_degrees
+from urdfkin.errors.numbers import UNIT_SHORT_NAMES, radians_from_degrees
 from urdfkin.errors.validators import safe_repr
 
 
@@ -245,7 +245,7 @@ def parse_cell(original: str) -> Cell:
     numbers = [term for term in terms if not term.variable]
     if len(variables) > 1:
         raise InvalidCellError("two variables in one cell")
-    units = {UNITS[unit] for term in terms for unit in term.units}
+    units = {UNIT_SHORT_NAMES[unit] for term in terms for unit in term.units}
     units |= {"rad" for term in terms if term.has_pi}
     if len(units) > 1:
         raise InvalidCellError(f"{' and '.join(sorted(units))} in one cell")
@@ -299,7 +299,7 @@ class _Term:
         elif token == "pi":
             self.has_pi, self.text = True, ""
             self._multiply(math.pi)
-        elif token in UNITS and not self.is_empty and not self.operator:
+        elif token in UNIT_SHORT_NAMES and not self.is_empty and not self.operator:
             self.units = (*self.units, token)
         else:
             raise InvalidCellError(f"{token!r} is not understood")

@@ -17,13 +17,13 @@ from typing import Any, Self, TypeVar
 from urdfkin.errors.escape import log_line
 
 #: Number of leading characters of a name that `find_similar_names` compares.
-_MAX_COMPARED_CHARACTERS = 128
-MAX_COMPARISONS = 1_000_000
+_COMPARED_PREFIX_LENGTH = 128
+MAX_CHARACTER_PAIRS = 1_000_000
 _MAX_SUGGESTIONS = 3
 
 
 def find_similar_names(
-    word: str, valid_names: Iterable[str], *, cutoff: float = 0.6, work: int = MAX_COMPARISONS
+    word: str, valid_names: Iterable[str], *, cutoff: float = 0.6, work: int = MAX_CHARACTER_PAIRS
 ) -> list[str]:
     """Return up to three known names that are similar to `word`, the most similar first.
 
@@ -35,14 +35,14 @@ def find_similar_names(
     >>> find_similar_names("UR5", ["ur5", "panda"])
     ['ur5']
     """
-    prefix = word[:_MAX_COMPARED_CHARACTERS].lower()
+    prefix = word[:_COMPARED_PREFIX_LENGTH].lower()
     matcher = difflib.SequenceMatcher(b=prefix)
     found = []
     for name in valid_names:
-        matcher.set_seq1(name[:_MAX_COMPARED_CHARACTERS].lower())
+        matcher.set_seq1(name[:_COMPARED_PREFIX_LENGTH].lower())
         if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
             continue
-        work -= len(prefix) * len(name[:_MAX_COMPARED_CHARACTERS])
+        work -= len(prefix) * len(name[:_COMPARED_PREFIX_LENGTH])
         if work < 0:
             break
         if (similarity := matcher.ratio()) >= cutoff:

@@ -50,7 +50,7 @@ class Table:
             for row in self.rows
         ]
 
-    def _split_cells(self) -> list[list[tuple[str, str]]]:
+    def _split_tree_lines(self) -> list[list[tuple[str, str]]]:
         """Split each heading and cell into two texts: leading characters such as `├ `, and the rest."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(TREE_LINES),)]
@@ -71,11 +71,11 @@ class Table:
 
     def markdown(self) -> str:
         marks = [":---" if self.is_left(i) else "---:" for i in range(len(self.heads))]
-        heads, *rows = self._split_cells()
+        heads, *rows = self._split_tree_lines()
 
-        def cell(i: int, lines: str, words: str) -> str:
+        def cell(i: int, tree_lines: str, words: str) -> str:
             shown = markdown_code(words) if i in self.names else markdown_cell(words)
-            return lines.replace(" ", "&nbsp;") + shown
+            return tree_lines.replace(" ", "&nbsp;") + shown
 
         body = [[cell(i, *parts) for i, parts in enumerate(row)] for row in rows]
         titles = [markdown_cell("".join(head)) for head in heads]
@@ -97,11 +97,11 @@ class Table:
         sides = "".join("l" if self.is_left(i) else "r" for i in range(len(self.heads)))
         rows = [
             " & ".join(
-                lines.translate(ASCII_TREE_LINES).replace(" ", "~") + latex_text(words)
-                for lines, words in row
+                tree_lines.translate(ASCII_TREE_LINES).replace(" ", "~") + latex_text(words)
+                for tree_lines, words in row
             )
             + r" \\"
-            for row in self._split_cells()
+            for row in self._split_tree_lines()
         ]
         lines = [
             rf"\begin{{tabular}}{{{sides}}}",

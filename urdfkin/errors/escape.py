@@ -119,10 +119,10 @@ def csv_cell(name: str) -> str:
     return f"'{line}" if line.lstrip("' ").startswith(FORMULA_STARTS) else line
 
 
-def csv_value(text: str) -> str:
+def csv_number_or_text(text: str) -> str:
     """Escape text for a CSV cell as `csv_cell` does; return a number unchanged.
 
-    >>> csv_value("-0.5"), csv_value("-y")
+    >>> csv_number_or_text("-0.5"), csv_number_or_text("-y")
     ('-0.5', "'-y")
     """
     return text if _NUMBER.fullmatch(text) else csv_cell(text)

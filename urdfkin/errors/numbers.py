@@ -61,7 +61,7 @@ def number_remedy(text: str) -> str | None:
 
 
 #: Short name of a unit, for each accepted name of the unit.
-UNITS = {
+UNIT_SHORT_NAMES = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
     **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), "m"),
@@ -81,12 +81,12 @@ class ParsedNumber(NamedTuple):
 
     Attributes:
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
-        per: Exponent of the seconds in the denominator of the unit: 1 for rad/s, 2 for rad/s^2.
+        seconds_exponent: Exponent of the seconds in the denominator of the unit: 1 for rad/s, 2 for rad/s^2.
     """
 
     value: float
     unit: str | None
-    per: int
+    seconds_exponent: int
 
 
 def parse_quantity(text: str) -> ParsedNumber | None:
@@ -95,13 +95,13 @@ def parse_quantity(text: str) -> ParsedNumber | None:
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)
     >>> parse_quantity("2 rad/s^2"), parse_quantity("1-2")
-    (ParsedNumber(value=2.0, unit='rad', per=2), None)
+    (ParsedNumber(value=2.0, unit='rad', seconds_exponent=2), None)
     """
     plain = text.strip(" \t\r\n").lower()
     plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")
     if len(plain) > _MAX_QUANTITY_LENGTH or (found := _QUANTITY.fullmatch(plain)) is None:
         return None
-    unit = UNITS.get(found["unit"]) if found["unit"] else None
+    unit = UNIT_SHORT_NAMES.get(found["unit"]) if found["unit"] else None
     value = _product(found["factors"])
     if value is None or (found["unit"] and unit is None):
         return None

@@ -11,8 +11,8 @@ from typing import Any, TypeGuard
 from urdfkin.errors import InputError
 
 
-def as_int(value: object, name: str, least: int, most: float = math.inf) -> int:
-    """Return `value` as an int from `least` to `most`.
+def as_int(value: object, name: str, minimum: int, maximum: float = math.inf) -> int:
+    """Return `value` as an int from `minimum` to `maximum`.
 
     >>> as_int(True, "threads", 1)
     Traceback (most recent call last):
@@ -21,9 +21,13 @@ def as_int(value: object, name: str, least: int, most: float = math.inf) -> int:
     try:
         number = index(None if isinstance(value, bool) else value)  # type: ignore[arg-type]
     except TypeError:
-        raise InputError(f"{name} must be a whole number, at least {least}", found=safe_repr(value)) from None
-    if not least <= number <= most:
-        beyond = f"{name} must be at most {most}" if number > most else f"{name} must be at least {least}"
+        raise InputError(
+            f"{name} must be a whole number, at least {minimum}", found=safe_repr(value)
+        ) from None
+    if not minimum <= number <= maximum:
+        beyond = (
+            f"{name} must be at most {maximum}" if number > maximum else f"{name} must be at least {minimum}"
+        )
         raise InputError(beyond, found=safe_repr(value))
     return number
 
@@ -34,7 +38,7 @@ def as_finite_float(value: object, name: str) -> float:
     >>> as_finite_float(1, "snap")
     1.0
     """
-    if not is_real(value) or not math.isfinite(number := as_float(value)):
+    if not is_real(value) or not math.isfinite(number := float_or_infinity(value)):
         raise InputError(f"{name} must be a finite number", found=safe_repr(value))
     return number
 
@@ -43,7 +47,7 @@ def is_real(value: object) -> TypeGuard[Real]:
     return isinstance(value, Real | Decimal) and not isinstance(value, bool)
 
 
-def as_float(value: Any) -> float:
+def float_or_infinity(value: Any) -> float:
     try:
         return float(value)
     except OverflowError:

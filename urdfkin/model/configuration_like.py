@@ -200,7 +200,7 @@ with 'neutral, elbow=...'
             return value
         order = "qva".index(self.symbol)
         other = unit is not None and quantity.unit not in (None, unit)
-        if other or quantity.per not in (0, order):
+        if other or quantity.seconds_exponent not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
             per = ("", ", or these units per s", ", or these units per s^2")[order]
             hint = f"use {kinds}{per}"

@@ -31,7 +31,7 @@ from urdfkin.report.words import (
     worst,
 )
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, as_json_data, doc, parse_json
-from urdfkin.system.files import MAX_BYTES, is_folder, read_bytes, shorten_path
+from urdfkin.system.files import MAX_BYTES, abbreviate_path, is_folder, read_bytes
 from urdfkin.validation.document import OUTCOMES, VALIDATION, BoundRatio, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import versions
 
@@ -173,7 +173,7 @@ def read_history(paths: Sequence[Path]) -> History:
         some = "; ".join(f"{one['file']}: {one['reason']}" for one in history.unusable[:3])
         raise InputError(
             "no report to show",
-            where=", ".join(shorten_path(path) for path in paths[:3]),
+            where=", ".join(abbreviate_path(path) for path in paths[:3]),
             found=some or "neither .json files nor a folder of `validate --store`",
             remedy=f"write one with: {VALIDATION.command}",
         )
@@ -195,7 +195,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
             if count > MOST_RUNS:
                 raise InputError(
                     f"more than {MOST_RUNS:,} reports",
-                    where=shorten_path(path),
+                    where=abbreviate_path(path),
                     remedy="pass fewer files, or a folder with fewer files",
                 )
             yield file
@@ -215,7 +215,7 @@ def _in_folder(folder: Path) -> Iterator[Path]:
         if seen > MOST_FILES:
             raise InputError(
                 f"more than {MOST_FILES:,} files",
-                where=shorten_path(folder),
+                where=abbreviate_path(folder),
                 remedy="name the reports' folder",
             )
         yield from (here / name for name in sorted(names) if name.endswith(".json"))

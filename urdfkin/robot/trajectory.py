@@ -33,7 +33,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.errors.numbers import UNITS, number_remedy, parse_float, parse_quantity, radians_from_degrees
+from urdfkin.errors.numbers import (
+    UNIT_SHORT_NAMES,
+    number_remedy,
+    parse_float,
+    parse_quantity,
+    radians_from_degrees,
+)
 from urdfkin.errors.validators import as_finite_float, as_int
 from urdfkin.kinematics.inputs import FloatArray, as_finite
 from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_from_quaternion
@@ -529,11 +535,16 @@ def _parse_unit(text: str, where: str, expected: str) -> str:
     found = parse_quantity(f"1 {text}")
     word = text.lower().replace("°", "deg").partition("/")[0].strip()
     order = ("", "s", "s^2").index(per)
-    if found is None or word not in UNITS or found.unit != kind or found.per not in (0, order):
+    if (
+        found is None
+        or word not in UNIT_SHORT_NAMES
+        or found.unit != kind
+        or found.seconds_exponent not in (0, order)
+    ):
         known = {"rad": ("rad", "deg"), "m": ("m", "mm")}.get(kind, ())
         fit = " or ".join("/".join(filter(None, (unit, per))) for unit in known)
         raise InputError("wrong unit", where=where, found=text, remedy=f"use {fit or 'no unit'}")
-    return "" if UNITS[word] == kind else UNITS[word]
+    return "" if UNIT_SHORT_NAMES[word] == kind else UNIT_SHORT_NAMES[word]
 
 
 def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:

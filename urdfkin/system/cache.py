@@ -75,12 +75,12 @@ def make_cache_folder(
 
 
 def warn_once(message: str) -> None:
-    if message not in _warned:
-        _warned.add(message)
+    if message not in _warned_messages:
+        _warned_messages.add(message)
         warnings.warn(message, CacheWarning, stacklevel=3)
 
 
-_warned: set[str] = set()
+_warned_messages: set[str] = set()
 
 
 def _unsafe_reason(folder: Path) -> str | None:

@@ -31,8 +31,8 @@ def of_length(n: int) -> Meta:
 
 
 Count = Annotated[int, Meta(ge=0)]
-Size = Annotated[float, Meta(ge=0)]
-Matrix = Annotated[
+NonNegativeFloat = Annotated[float, Meta(ge=0)]
+TransformRows = Annotated[
     list[Annotated[list[float], of_length(4)]],
     of_length(4),
     doc("Homogeneous transform (4, 4) as a list of rows, with the translation in metres."),

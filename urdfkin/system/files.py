@@ -64,7 +64,7 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -
     """
     data = read_start(path, max_bytes + 1, pipes=pipes)
     if len(data) > max_bytes:
-        raise _too_large(shorten_path(path), max_bytes)
+        raise _too_large(abbreviate_path(path), max_bytes)
     return data
 
 
@@ -87,11 +87,11 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
     except SourceError:
         raise
     except FileNotFoundError as error:
-        raise SourceError("no such file", where=shorten_path(path)) from error
+        raise SourceError("no such file", where=abbreviate_path(path)) from error
     # A null character in the name raises ValueError.
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise SourceError("cannot be read", where=shorten_path(path), found=reason) from error
+        raise SourceError("cannot be read", where=abbreviate_path(path), found=reason) from error
 
 
 def require_regular_file(path: Path) -> None:
@@ -107,7 +107,7 @@ def _require_regular(path: Path, kind: int) -> None:
     if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
         raise SourceError(
             "not a regular file",
-            where=shorten_path(path),
+            where=abbreviate_path(path),
             found=_FILE_TYPES.get(stat.S_IFMT(kind), "another kind"),
             remedy="put a regular file in its place",
         )
@@ -149,7 +149,7 @@ def read_start_of_standard_input(count: int) -> bytes:
     return data
 
 
-def exists(path: Path) -> bool:
+def may_exist(path: Path) -> bool:
     """Return whether a path exists, or True if the check fails, for example for a path that is too long."""
     try:
         return path.exists()
@@ -172,10 +172,10 @@ def expand_home(name: str | os.PathLike[str]) -> Path:
         return Path(name)
 
 
-def shorten_path(path: Path) -> str:
+def abbreviate_path(path: Path) -> str:
     """Return a path for a message; a path of more than 300 characters is abbreviated.
 
-    >>> len(shorten_path(Path("x" * 5000))) < 200
+    >>> len(abbreviate_path(Path("x" * 5000))) < 200
     True
     """
     text = str(path)

@@ -59,7 +59,7 @@ def installed_version(package: str) -> str | None:
 
 
 #: Copy of the requirements of the extras for users in pyproject.toml.
-EXTRAS = {
+EXTRA_REQUIREMENTS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",
     "view": "viser>=1",
@@ -75,19 +75,19 @@ def install_command(extra: str) -> str:
 
     pip cannot install an extra of urdfkin by name, because no package index contains urdfkin yet.
     """
-    return f"pip install '{EXTRAS[extra]}'"
+    return f"pip install '{EXTRA_REQUIREMENTS[extra]}'"
 
 
 def urdfkin_version() -> str:
     return installed_version("urdfkin") or "of a checkout"
 
 
-_HOOKS: dict[str, Callable[..., Any]] = {}
+_HOOKS_BY_NAME: dict[str, Callable[..., Any]] = {}
 
 
 def register_hook(name: str, function: Callable[..., Any]) -> None:
-    _HOOKS[name] = function
+    _HOOKS_BY_NAME[name] = function
 
 
 def get_hook(name: str) -> Callable[..., Any]:
-    return _HOOKS[name]
+    return _HOOKS_BY_NAME[name]

@@ -12,7 +12,7 @@ import threading
 
 _locks: list[threading.RLock] = []
 #: The locks that a thread acquired before its fork. The key is the identifier of the thread.
-_acquired: dict[int, list[threading.RLock]] = {}
+_acquired_locks: dict[int, list[threading.RLock]] = {}
 
 
 def make_fork_safe_lock() -> threading.RLock:
@@ -24,22 +24,23 @@ def make_fork_safe_lock() -> threading.RLock:
 
     Use this function only for module variables, because this module stores each lock until the process ends.
     """
-    import_lock.register()
+    import_lock.register_fork_handlers()
     lock = threading.RLock()
     _locks.append(lock)
     return lock
 
 
 def _before_fork() -> None:
-    acquired = _acquired[threading.get_ident()] = list[threading.RLock]()
+    acquired = _acquired_locks[threading.get_ident()] = list[threading.RLock]()
     for lock in reversed(_locks[:]):
         lock.acquire()
         acquired.append(lock)
 
 
 def _after_fork() -> None:
-    # If another thread registered `_before_fork` during this fork, `_acquired` has no entry for this thread.
-    for lock in reversed(_acquired.pop(threading.get_ident(), [])):
+    # If another thread registered `_before_fork` during this fork, `_acquired_locks` has no entry for this
+    # thread.
+    for lock in reversed(_acquired_locks.pop(threading.get_ident(), [])):
         lock.release()
 
 
@@ -52,14 +53,15 @@ class ImportLock:
     A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. A thread that
     holds the import lock may need the lock of `logging` during the import. To avoid a deadlock, a fork must
     acquire the import lock before the lock of `logging`. Before a fork, Python calls the function that was
-    registered last first. Therefore, `register` imports `logging` before registering `_before_fork`.
+    registered last first. Therefore, `register_fork_handlers` imports `logging` before registering
+    `_before_fork`.
     """
 
     def __init__(self) -> None:
         self._lock, self._registered = threading.RLock(), False
         _locks.append(self._lock)
 
-    def register(self) -> None:
+    def register_fork_handlers(self) -> None:
         # This return avoids a deadlock: the holder of the lock may wait for the import of the calling module.
         if self._registered:
             return
@@ -74,7 +76,7 @@ class ImportLock:
                 self._registered = True
 
     def __enter__(self) -> None:
-        self.register()
+        self.register_fork_handlers()
         self._lock.acquire()
 
     def __exit__(self, *error: object) -> None:

@@ -35,8 +35,11 @@ def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
 
 def _import_path() -> list[str]:
     # Empty and relative entries of `sys.path` depend on the current folder.
-    home = str(Path(__file__).resolve().parents[2])
-    return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)), home]
+    package_parent = str(Path(__file__).resolve().parents[2])
+    return [
+        *(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)),
+        package_parent,
+    ]
 
 
 def _is_dask_folder(entry: str) -> bool:
@@ -88,18 +91,18 @@ def run_python(
 
 
 @contextmanager
-def avoid_settings_file(settings: str) -> Iterator[None]:
+def leave_folder_with_settings(settings_file: str) -> Iterator[None]:
     """Make `/` the current folder if the current folder contains a settings file that must not be read."""
-    if not os.path.lexists(settings):
+    if not os.path.lexists(settings_file):
         yield
         return
-    here = os.open(".", os.O_PATH)
+    folder_descriptor = os.open(".", os.O_PATH)
     os.chdir("/")
     try:
         yield
     finally:
-        os.fchdir(here)
-        os.close(here)
+        os.fchdir(folder_descriptor)
+        os.close(folder_descriptor)
 
 
 _T = TypeVar("_T")

@@ -22,10 +22,10 @@ def questions_page() -> Path:
 
 def _find_file(what: str, *paths: str) -> Path:
     """Return the first existing path; `paths` are relative to the folder that contains the package."""
-    here = Path(__file__).resolve().parents[2]
-    if (file := next((path for path in map(here.joinpath, paths) if path.is_file()), None)) is None:
+    package_parent = Path(__file__).resolve().parents[2]
+    if (file := next((path for path in map(package_parent.joinpath, paths) if path.is_file()), None)) is None:
         raise SourceError(
-            f"urdfkin's {what} missing", where=str(here / "urdfkin"), remedy="install urdfkin again"
+            f"urdfkin's {what} missing", where=str(package_parent / "urdfkin"), remedy="install urdfkin again"
         )
     return file
 

@@ -31,7 +31,7 @@ from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.errors.validators import as_str
-from urdfkin.system.files import exists, is_folder, read_start
+from urdfkin.system.files import is_folder, may_exist, read_start
 from urdfkin.system.resources import example_robots_dir, robots_dir
 
 
@@ -198,7 +198,7 @@ class ResolvedDescription:
 def find_description(source: object) -> ResolvedDescription | None:
     """Return the file of a robot in robot_descriptions, or None for any other source."""
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
-        if source in catalogue() or exists(Path(source)):
+        if source in catalogue() or may_exist(Path(source)):
             return None
         source = _import_description(source)
     return _find_description_file(source) if isinstance(source, ModuleType) else None

@@ -15,7 +15,7 @@ from typing import IO, TypeGuard
 
 from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, find_similar_names
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
-from urdfkin.system.files import MAX_BYTES, exists, expand_home, read_start, read_start_of_standard_input
+from urdfkin.system.files import MAX_BYTES, expand_home, may_exist, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import CatalogueEntry, catalogue, find_package, split_uri
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
@@ -225,7 +225,7 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
         read = _read_file(entry.path, max_bytes)
         return UrdfText(read.data, read.label, source, entry)
     path = expand_home(source)
-    if os.sep in source or path.suffix or exists(path):
+    if os.sep in source or path.suffix or may_exist(path):
         return _read_file(path, max_bytes)
     raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
 

@@ -12,10 +12,19 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, NotRequired, TypedDict
 
-from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Sha256, Size, doc, of_length
+from urdfkin.system.documents import (
+    Count,
+    DocumentKind,
+    Header,
+    NonNegativeFloat,
+    Sha256,
+    TransformRows,
+    doc,
+    of_length,
+)
 
 _UNDEFINED = "null: a result is NaN, or two values with the bound 0 differ."
-Units = Annotated[Size | None, doc(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
+Units = Annotated[NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
 BoundRatio = Annotated[
     float | None, doc(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
 ]
@@ -60,7 +69,7 @@ class ReportedJoint(TypedDict):
         str,
         doc("Name of the child link. The child link's frame is the joint's frame after the joint's motion."),
     ]
-    placement: Annotated[Matrix, doc("Pose of the joint's frame in the parent link's frame at q = 0.")]
+    placement: Annotated[TransformRows, doc("Pose of the joint's frame in the parent link's frame at q = 0.")]
     axis: Annotated[
         Annotated[list[float], of_length(3)] | None,
         doc("Unit axis in the joint's frame; null for kinds without an axis."),
@@ -181,8 +190,8 @@ class ReportedDHTable(TypedDict):
     """A table in one convention."""
 
     rows: Annotated[list[ReportedDHRow], doc("Rows of the table from base to tip.")]
-    base: Matrix
-    tool: Matrix
+    base: TransformRows
+    tool: TransformRows
 
 
 class Chain(TypedDict):

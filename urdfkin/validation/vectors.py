@@ -31,7 +31,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
-from urdfkin.system.documents import Count, DocumentKind, Sha256, Size, doc, of_length
+from urdfkin.system.documents import Count, DocumentKind, NonNegativeFloat, Sha256, doc, of_length
 from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_text, write_file
 from urdfkin.system.lazy_import import lazy_import
 from urdfkin.system.resources import robots_dir
@@ -119,7 +119,7 @@ class Result(TypedDict):
         doc("Reference frame; null for a placement."),
     ]
     shape: Annotated[list[Count], doc("Shape of the result. The last index varies fastest in the lists.")]
-    k: Annotated[Size, doc("The tolerance in multiples of 2^-52 times the size of the terms.")]
+    k: Annotated[NonNegativeFloat, doc("The tolerance in multiples of 2^-52 times the size of the terms.")]
     value: Annotated[list[float], doc("The true values, rounded to 17 significant digits.")]
     tolerance: Annotated[
         list[float], doc("Largest allowed difference from the true value; 0: the result must be equal.")

@@ -13,7 +13,7 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.documents import Count, DocumentKind, Header, Size, as_json_data, doc
+from urdfkin.system.documents import Count, DocumentKind, Header, NonNegativeFloat, as_json_data, doc
 from urdfkin.system.files import expand_home, write_file
 from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.verify.comparison import BatchComparison
@@ -99,14 +99,15 @@ class LineEntry(TypedDict):
     quantity: Annotated[str, doc("Name of the quantity.")]
     checked: Annotated[Count, doc("Number of results that the oracle confirmed.")]
     worst: Annotated[
-        Size | None,
+        NonNegativeFloat | None,
         doc(
             "Largest difference between a result and the oracle's result, in multiples of eps * scale;"
             " null: this multiple is not finite."
         ),
     ]
     bound_ratio: Annotated[
-        Size | None, doc("Largest ratio of a difference to its bound; null: the ratio is not finite.")
+        NonNegativeFloat | None,
+        doc("Largest ratio of a difference to its bound; null: the ratio is not finite."),
     ]
     unchecked: Annotated[Count, doc("Number of results that were returned without a check.")]
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import escape_unprintable
 from urdfkin.system.lazy_import import install_command
-from urdfkin.system.processes import avoid_settings_file
+from urdfkin.system.processes import leave_folder_with_settings
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -86,7 +86,7 @@ def _matplotlib() -> Any:
     """Import matplotlib without the settings of a file `matplotlibrc` in the current folder."""
     if not has_matplotlib():
         raise InputError("drawing needs matplotlib", remedy=install_command("plots"))
-    with avoid_settings_file("matplotlibrc"):
+    with leave_folder_with_settings("matplotlibrc"):
         return importlib.import_module("matplotlib")
 
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import os
 import sys
 
-from urdfkin.system.processes import avoid_settings_file
+from urdfkin.system.processes import leave_folder_with_settings
 
 if "numba" not in sys.modules:
-    with avoid_settings_file(".numba_config.yaml"):
+    with leave_folder_with_settings(".numba_config.yaml"):
         from numba.core import config
     config._config_fname = os.devnull

@@ -32,7 +32,7 @@ from typing import Any
 
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.validators import is_real, safe_repr
-from urdfkin.system.files import exists, read_text, shorten_path
+from urdfkin.system.files import abbreviate_path, may_exist, read_text
 
 #: Factors that convert rad or m to each unit.
 _UNITS = {"rad": 1.0, "deg": 180.0 / math.pi, "turn": 0.5 / math.pi, "m": 1.0, "mm": 1000.0}
@@ -145,8 +145,8 @@ def find_convention(name: str | Path | Convention) -> Convention:
     if (known := _load_built_in().get(str(name))) is not None:
         return known
     path = Path(name)
-    if path.suffix == ".toml" or exists(path):
-        return parse_convention(read_text(path), shorten_path(path), path.stem)
+    if path.suffix == ".toml" or may_exist(path):
+        return parse_convention(read_text(path), abbreviate_path(path), path.stem)
     error = UnknownNameError("convention", str(name), BUILT_IN_NAMES)
     names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
     error.remedy = f"{error.remedy} {names}"

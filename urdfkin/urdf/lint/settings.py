@@ -28,7 +28,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.system.files import exists, is_folder, read_bytes, read_text
+from urdfkin.system.files import is_folder, may_exist, read_bytes, read_text
 from urdfkin.system.git import CommitFiles
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
@@ -157,9 +157,9 @@ def find_settings(start: Path) -> Settings:
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
-        if exists(file) and (found := _read_table(file)) is not None:
+        if may_exist(file) and (found := _read_table(file)) is not None:
             return _check_settings(file, found)
-        if exists(folder / ".git"):
+        if may_exist(folder / ".git"):
             break
     return Settings()
 
@@ -196,7 +196,7 @@ def _check_settings(file: Path, table: Any) -> Settings:
                 find_codes(word for each in lists for word in each)
             except UnknownNameError as error:
                 raise InputError(f"{name}: {error.what}", where=where, remedy=error.remedy) from None
-    if "baseline" in table and not exists(baseline := file.parent / table["baseline"]):
+    if "baseline" in table and not may_exist(baseline := file.parent / table["baseline"]):
         remedy = f"change the setting in {where}"
         raise SourceError("the baseline file does not exist", where=str(baseline), remedy=remedy)
     return Settings(file, table)
@@ -314,7 +314,7 @@ def find_files(
     if is_folder(path):
         files = sorted(_walk_folder(path, settings.root, include, exclude))
         remedy = f"searched for {', '.join(include)}, except in hidden and excluded folders"
-    elif glob.has_magic(argument) and not exists(path):
+    elif glob.has_magic(argument) and not may_exist(path):
         files = [file for file in _expand_pattern(argument) if not matches(file, exclude, settings.root)]
         remedy = None
     else:
