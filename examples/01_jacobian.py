@@ -1,4 +1,4 @@
-"""Compute the Jacobian at a pose given by joint names, and interpret one of its columns.
+"""Compute the Jacobian at a pose that names joints and their values, and interpret one of its columns.
 
 You learn how to name joints, which units apply, how rows and columns are ordered, and how results are
 checked.

@@ -5,14 +5,14 @@
 
 `tests/comparison/pairs.py` defines twenty-one changes of a robot. The script makes each change alone, in a
 copy of the robot. For eleven of the changes, `same` must find that robot and copy are equivalent, and must
-predict the pose of every matched link. The script tests the predicted poses at random configurations. For the
-other ten changes, `same` must find that robot and copy differ. The change `rounded` is an exception: rounding
-to four digits leaves some robots unchanged, so every verdict is accepted.
+predict the poses of matched links in the copy. The script tests the predicted poses at random configurations.
+For the other ten changes, `same` must find that robot and copy differ. The change `rounded` is an exception:
+rounding to four digits leaves some robots unchanged, so every verdict is accepted.
 
-For each of these ten changes, the script also checks the interval of `same` for the largest distance between
-a frame of the robot and the corresponding frame of the copy. An independent global search maximizes
-the distance. The script computes the distance with fifty digits from the decimal numbers in the two URDF
-texts. The distance must lie in the interval.
+After these ten changes, the script also checks the interval of `same` for the largest distance between a
+frame of the robot and the corresponding frame of the copy. The script skips an infinite interval, and a copy
+whose base `same` moves. An independent global search maximizes the distance. The script computes the distance
+with fifty digits from the decimal numbers in the two URDF texts. The distance must lie in the interval.
 
 Exit 1: a distance is outside its interval, or a verdict is wrong.
 """

@@ -8,7 +8,7 @@ There are several families of files:
 | family | content |
 |---|---|
 | mutants | mutants of the shipped robots |
-| names, prefixes, versions, ..., everything | random robots with one kind of unusual content, or all kinds |
+| names, prefixes, versions, ..., everything | random robots with one or several kinds of unusual content |
 | MJCF | free bodies, equality constraints and default classes; MuJoCo checks them independently |
 
 Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases

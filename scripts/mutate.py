@@ -78,7 +78,10 @@ def _read_tests() -> dict[Path, str]:
 
 
 def find_near_tests(path: Path) -> list[str]:
-    """Return the test files that mention a module, and the test files of its package."""
+    """Return the test files that mention a module, and the test files of its package.
+
+    For a package without test files, return test_robot.py and the files in tests/verify and tests/laws.
+    """
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -187,7 +190,7 @@ def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
     change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
     result, detail = _run_in_process(change, [named.test], timeout)
     if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
-        # The named test did not fail: pytest reports another problem, for example an import error.
+        # `named.test` did not fail: pytest reports another problem, for example an import error.
         result = "not run"
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)

@@ -5,7 +5,7 @@ The interpreter does not need urdfkin.
     python scripts/run_exported.py torch robot_torch.py robot_array.py
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-The first argument names the library, `torch` or `jax`. The script runs the function `check` of each file.
+The first argument names the library, `torch` or `jax`. The script calls `check`, a function in each file.
 Files of the format `array` use this library. If a file contains a Hessian, the script differentiates the
 file's Jacobian with the library. The result must agree with the true Hessian in the file, within the file's
 error bounds. For the first file of PyTorch code, `torch.compile` compiles all functions except `hessian`.

@@ -158,7 +158,7 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 # For each k, the benchmark measures a kernel that has only the first k steps.
 # The time of step k is the time for k steps, minus the time for k - 1 steps.
 # For one configuration, the benchmark measures seven lines of Python (`_calls`).
-# Only the last line, which calls the robot's method, contains all steps.
+# Only the seventh line, a call of the robot's method, contains all steps.
 # The time of a step follows from differences between the times of the lines.
 
 #: Instructions for each step of a batch, in the order of the steps.

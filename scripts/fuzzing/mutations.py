@@ -116,7 +116,7 @@ def _change_tree(rng: random.Random, kind: str, data: bytes) -> bytes:
         return data
     if root.tag != "robot":
         return data
-    # Without an element of the chosen kind, the tree of elements stays unchanged.
+    # If the file has no element to which the change `kind` applies, the tree stays unchanged.
     with contextlib.suppress(IndexError):
         (_change_structure if kind in _STRUCTURE else _change_elements)(rng, kind, root)
     changed: bytes = ET.tostring(root, encoding="utf-8")

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from scripts.fuzzing import Case
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: Robots of the family "everything" have several random kinds of unusual content.
+#: A robot of the family "everything" has each kind of unusual content with probability 0.4.
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 

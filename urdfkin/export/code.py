@@ -33,7 +33,7 @@ class FrameCode:
     No name can end a comment.
 
     Attributes:
-        identifiers: Names of the coordinates ("q"), velocities ("v", "a") and joints ("s").
+        identifiers: Names in the code, by letter: "q": coordinates; "v", "a": velocities; "s": joints.
         maybe_proof: None for code that is not exported.
         exact: Returns code with exact constants.
     """

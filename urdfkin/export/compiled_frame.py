@@ -203,8 +203,8 @@ class CompiledFrame:
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
     exactly the same result in a batch and in a single call. A wrong shape or a number that is not finite is
     an error. The machine code is compared with Pinocchio once, on more than a hundred configurations. After
-    `load(verify=False)`, this comparison is omitted. `Robot.certificate` reports the results of all calls
-    as unchecked.
+    `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of
+    a `CompiledFrame` as unchecked.
 
     Attributes:
         frame: The frame's name.

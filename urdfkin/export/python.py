@@ -238,7 +238,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    # `forward` calls the exported function with the fewest inputs.
+    # The method `forward` calls the exported function with the fewest of the inputs q, v and a.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,

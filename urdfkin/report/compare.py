@@ -196,7 +196,7 @@ class ReportChange:
     """A difference between two reports.
 
     The field `robot` is None if the difference concerns the whole run. The fields `old` and `new` contain the
-    values in the old and in the new report. A field is empty if its report has no value.
+    values in the old and in the new report. If a report has no value, its field `old` or `new` is "".
     """
 
     robot: str | None
@@ -331,9 +331,11 @@ def find_renamed_files(
 ) -> dict[str, str]:
     """Find robots whose file was renamed between two reports, and return a mapping from old to new source.
 
-    A file was renamed if one source is only in the old report, one source is only in the new report, and both
-    sources have the same robot name.
-    In each report, only one source that the other report lacks has this robot name.
+    Source A of the old report was renamed to source B of the new report in this case:
+
+    - A and B have the same robot name.
+    - A is the only source with this name that the new report lacks.
+    - B is the only source with this name that the old report lacks.
     """
     gone, new = _by_name(before, after), _by_name(after, before)
     return {

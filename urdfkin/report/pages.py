@@ -196,11 +196,11 @@ def _bound_ratio(check: ReportedCheck, subject: int) -> float:
     """Return an upper limit of the ratio "disagreement / bound" for one subject: a frame, joint or column.
 
     The document has bounds only for the whole check, not for each subject. Therefore, this function divides
-    the subject's largest disagreement by the smallest bound of the check. No subject has a larger ratio than
-    the check's `bound_ratio`, so the function reduces a larger quotient to `bound_ratio`.
+    the subject's largest disagreement by the smallest bound of the check. The check's
+    `bound_ratio` is the largest ratio of all subjects, so a larger quotient is replaced by `bound_ratio`.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
-    # A disagreement of 0 lies within every bound.
+    # A disagreement of 0 has the ratio 0, even if the bound is 0.
     if not value:
         return math.inf if value is None else 0.0
     if not tightest:

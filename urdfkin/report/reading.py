@@ -1,9 +1,9 @@
 """Read report documents, and check the layout and the consistency of all entries.
 
-A user relies on a report, but somebody may have edited or truncated the file. The outcome, verdicts, sums
-and percentiles follow from other entries of the report, which also limit each ratio. This module reports
-entries that contradict other entries. The links and joints of a robot must form a tree. Independent joints
-must have consecutive indices in q and v, in the order of the joints.
+A user relies on a report, but somebody may have edited or truncated the file. Other entries of the
+report determine the outcome, the verdicts, the sums and the percentiles, and limit each ratio. This module
+reports entries that contradict other entries. The links and joints of a robot must form a tree. Independent
+joints must have consecutive indices in q and v, in the order of the joints.
 """
 
 from __future__ import annotations

@@ -409,11 +409,12 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    Without `worst`, the robots are in the zero configuration. If `written` is True, model B has the base pose
-    of the given file. If `written` is False, model B has the base pose `sameness.base`, which brings model B
-    closest to model A. Each line segment is four numbers: x and y of the start point, and x and y of the end
-    point. Each picture has the lines of A and the lines of B. In the enlarged picture, another line connects
-    the origins of the worst frame in A and in B.
+    Without `worst`, A is in its zero configuration, and B is in the matching configuration
+    `sameness.to_b(q_a)`. If `written` is True, model B has the base pose in the file of B. If `written` is
+    False, model B has the base pose `sameness.base`, which brings model B closest to model A. Each line
+    segment is four numbers: x and y of the start point, and x and y of the end point. Each picture has the
+    lines of A and the lines of B. In the enlarged picture, another line connects the origins of the worst
+    frame in A and in B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -446,7 +447,7 @@ def pictures(
 
 
 def _bones(robot: Robot, Ts: FloatArray) -> FloatArray:
-    """Return lines (joints, 2, 3) from each link to its child links."""
+    """Return a line for each joint (joints, 2, 3), from the parent link's origin to the child's origin."""
     ends = [(Ts[joint.parent, :3, 3], Ts[i + 1, :3, 3]) for i, joint in enumerate(robot.tree.joints)]
     return np.array(ends).reshape(-1, 2, 3)
 

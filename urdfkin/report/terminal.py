@@ -84,7 +84,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Return the names of the robots without any check, by verdict and reason, if more than four are equal.
+    """Group robots without checks by verdict and reason; return the names in groups of more than four.
 
     For example, all robots that an interrupted validation did not reach have the same reason.
     """

@@ -80,7 +80,7 @@ def format_ratio(ratio: Units) -> str:
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value. None stands for infinity: if a value is None, the result is None."""
+    """Return the largest value. None stands for infinity, so None is larger than every number."""
     largest = 0.0
     for value in values:
         if value is None:

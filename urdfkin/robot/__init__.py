@@ -1362,8 +1362,8 @@ class Robot(Displayable):
             form: Source of the pose: "tree": the joints of the URDF. "dh": the Denavit-Hartenberg table from
                 `base_frame` to the frame. "screws": the product of exponentials from `base_frame` to the
                 frame. With "dh" and "screws", `base_frame` takes the place of the world frame.
-            name: Name for the file of the code; in C, also the prefix of function names. None: the names of
-                the robot and the frame.
+            name: Name for the file of the code; in C, also the prefix of function names. None: a name
+                made of the robot's name and the frame's name.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
                 unchecked code contains the word UNVERIFIED.
 

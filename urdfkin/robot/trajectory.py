@@ -158,8 +158,8 @@ class Trajectory:
         notes: Remarks for the user, one line each. For example, a remark names a joint whose angle was
             unwrapped.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
-        errors: Estimated largest error of v and estimated largest error of a. None for given or exact v and
-            a, and for fewer than 5 samples.
+        errors: Estimated largest error of v and estimated largest error of a. None if v and
+            a were read from a file or are exact, or if there are fewer than 5 samples.
 
     >>> import urdfkin
     >>> make_line_trajectory(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)

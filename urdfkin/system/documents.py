@@ -151,7 +151,7 @@ class DocumentKind(Generic[_T]):
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
     """Find an entry of `data` that is missing in `document`, the result of the conversion of `data`.
 
-    Return the JSON path of the mapping that contains the entry, and a message. None: no entry is missing.
+    Return the JSON path of the mapping with the missing entry, and a message. None: no entry is missing.
     """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
@@ -189,7 +189,10 @@ def read_json(path: Path) -> object:
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse JSON; raise InputError for invalid JSON, or for a number beyond the range of doubles."""
+    """Parse JSON; raise InputError for invalid JSON, NaN, infinity, and numbers such as 1e999.
+
+    An integer may exceed the range of doubles.
+    """
     try:
         return json.loads(content, parse_constant=_parse_finite, parse_float=_parse_finite)
     except (ValueError, RecursionError) as error:

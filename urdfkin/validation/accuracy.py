@@ -48,7 +48,7 @@ from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_r
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(as_interval, otypes=[object])
 #: Groups of representations of the orientation.
-#: The study has two lines of analytical Jacobians: "euler angles" and "quaternion".
+#: The table of a study has two rows for analytical Jacobians: "euler angles" and "quaternion".
 #: The study omits the representations by angles about fixed axes.
 #: The Jacobian of such angles has the same rows as a Jacobian of Euler angles, in reverse order.
 _REPRESENTATIONS = {

@@ -68,7 +68,7 @@ class Diagnosis:
         """Return max |actual - predicted| / max |actual - expected|.
 
         Args:
-            predicted: urdfkin's results with a mistake that the user's function may have.
+            predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.
             n: Use only the first n configurations.
         """
         scale = self._nonzero_scale(n)

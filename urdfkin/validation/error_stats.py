@@ -163,7 +163,7 @@ class ErrorStats:
             bin is below the first edge, and the last bin is above the last edge.
         worst_by_frame: The largest disagreement of each frame, in eps * scale. The frames have the same order
             as in the robot.
-        bounds: Each result has its own bound. Smallest and largest bound of the results, in eps * scale.
+        bounds: Smallest and largest bound on a result's disagreement, in eps * scale.
     """
 
     results: int

@@ -283,7 +283,7 @@ def verify_function(
         seed: Seed of the random configurations.
         factor: The allowed difference is the bound on rounding errors times this factor. The bound is derived
             for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
-            errors. `FunctionCheck.smallest_factor` is the smallest factor with which all compared
+            errors. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared
             results agree with urdfkin's.
         batch: If True, the function computes n configurations in one call, and returns n results. The shapes
             of the inputs are then (n, nq) for q, and (n, nv) for v and a.

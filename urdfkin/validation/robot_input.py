@@ -62,7 +62,7 @@ class RobotInput:
         return self.origin.source
 
     def text(self) -> UrdfText:
-        """Return the robot's text; raise InputError if the file has changed."""
+        """Return the robot's text; raise InputError if the file's digest is not `sha256`."""
         if isinstance(self.source, bytes):
             return UrdfText(self.source, self.file, self.label, catalogue().get(self.label))
         text = read_source(self.source)

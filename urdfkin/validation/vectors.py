@@ -70,8 +70,8 @@ _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
 _GRID = 1024.0
-#: The tolerance k * eps * scale is first rounded to 12 significant digits.
-#: Then the tolerance is rounded upward to 3 significant digits.
+#: The tolerance k * eps * scale is rounded twice: to the nearest number with 12 significant digits,
+#: and then upward to a number with 3 significant digits.
 #: The rounding to 12 digits removes the last digits, which differ between processors.
 _DIGITS, _FIRST_DIGITS = 3, 12
 

@@ -147,7 +147,8 @@ class ProcessEngine:
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks of all robots.
 
-        Without `isolate`: after a crash, the robot's remaining tasks run last, in a separate process.
+        Without `isolate`: the unfinished tasks of a robot that crashed a process run last, in a separate
+        process.
         """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, alone=CRASHED).work()
@@ -202,7 +203,7 @@ class _WorkerPool:
                     self._workers.append(worker)
             except Exception as error:
                 if self._workers:
-                    # A worker process that already runs takes the task later.
+                    # No new process can be started, so an existing worker process takes the task later.
                     self._queue.put_back(task, tasks)
                     return
                 self._enter_answer(task, make_lost_failure("no process could be started", error))

@@ -37,7 +37,7 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, which are distinguishable with every colour vision deficiency.
+#: Okabe and Ito's colours, which they chose for readers with red-green or blue-yellow colour blindness.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
@@ -73,7 +73,7 @@ def style(**more: Any) -> Any:
 
 
 def label(name: str) -> str:
-    """Return a name for a drawing; characters that are missing in the font or illegal in XML are escaped."""
+    """Return a name for a drawing, with escapes for unprintable characters; XML forbids some of them."""
     return escape_unprintable(name)
 
 

@@ -22,7 +22,7 @@ from urdfkin.view.plot import caption
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
-#: Saved motion: frames per second, maximum number of steps between frames, and size in pixels.
+#: Saved motion: frames per second, maximum number of frames minus 1, and size in pixels.
 _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 

@@ -13,7 +13,7 @@ Four independent measures protect the viewer:
 Viser checks neither the Host header nor the Origin header, and has no option for these checks. To start the
 web server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that
 checks each request. To test the checks, this module sends forbidden requests to the running server before
-the viewer shows a robot. If the server accepts a forbidden request, this module stops the server. A new
+the viewer shows a robot. If the server accepts one of these requests, `new_server` stops the server. A new
 version of viser can therefore make the viewer fail, but not make the viewer insecure.
 
 Every user of the machine can read the command line of the browser. Therefore the command line does not
@@ -322,7 +322,7 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 def _remove_handlers(server: Any) -> None:
     """Remove the handlers with which viser processes messages from a page, except those in `_ACCEPTED`.
 
-    For example, viser has handlers for sharing, uploads and commands.
+    For example, viser handles a page's messages about sharing, uploads and commands.
     """
     try:
         websocket_server = server._websock_server

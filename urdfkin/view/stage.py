@@ -72,7 +72,7 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
-    """Return an arrow for each part of the acceleration, and an arrow for the sum of the parts.
+    """Return an arrow for each kind of acceleration in `ACCELERATION_KINDS`, and one for their sum.
 
     `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. An acceleration of at
     most 1e-9 m/s^2 has no arrow.
@@ -192,7 +192,10 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fit_cameras(self, Ts: FloatArray) -> None:
-        """Set the camera to show the robot in n configurations; Ts (n, links, 4, 4) are link placements."""
+        """Set the first camera of new pages, so that the robot is visible in n configurations.
+
+        `Ts` (n, links, 4, 4) contains the placements of the links.
+        """
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]

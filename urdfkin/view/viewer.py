@@ -41,7 +41,8 @@ from urdfkin.view.stage import (
 #: Joint ranges (rad, m) of at least this size count as unlimited.
 #: Velocity limits (rad/s, m/s) of at least this size count as unlimited too.
 _UNLIMITED = 100.0
-#: Step of a slider for an angle, in degrees or in radians. An arrow key changes the angle by one step.
+#: Step of a slider for an angle or an angle's derivative: _DEGREES if shown in degrees, else _RADIANS.
+#: An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
 #: Minimum number of steps of a slider in m, m/s or m/s^2.
 #: The slider's step is 1, 2 or 5 times a power of ten.
