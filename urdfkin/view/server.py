@@ -322,7 +322,8 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 def _remove_message_handlers(server: Any) -> None:
     """Remove the handlers with which viser processes messages from a page.
 
-    The handlers of the messages in `_ACCEPTED_MESSAGES` remain. For example, viser handles a page's messages about sharing, uploads and commands.
+    The handlers of the messages in `_ACCEPTED_MESSAGES` remain. For example, viser handles a page's messages
+    about sharing, uploads and commands. These handlers are removed.
     """
     try:
         websocket_server = server._websock_server
