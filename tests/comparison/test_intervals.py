@@ -243,8 +243,8 @@ def test_with_many_differences_the_upper_bound_is_tightened_close_to_the_lower_b
     upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE_GRID)
     assert upper > 1.6 * lower
     assert tighten(search, frame, 1.05 * lower, upper) == 1.05 * lower
-    assert tighten(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
-    assert tighten(search, frame, 1.05 * lower, upper, most=0) == upper
+    assert tighten(search, frame, 0.99 * lower, upper, max_boxes=2**14) > lower, "what is wrong is not proven"
+    assert tighten(search, frame, 1.05 * lower, upper, max_boxes=0) == upper
 
 
 def two_turns(place: str, inside: str) -> Robot:

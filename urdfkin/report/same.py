@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.comparison.result import (
-    BOUNDED_DIFFERENCES,
+    BOUNDED_DIFFERENCE_KINDS,
     Interval,
     Sameness,
     SameQuestion,
@@ -89,7 +89,9 @@ def _within(sameness: Sameness, most: float) -> str:
     if sameness.within(most):
         return f"{limit}no frame is ever off by more than {_both(*sameness.bound_as_written)}"
     if (
-        beyond := next((one for one in sameness.differences if one.what not in BOUNDED_DIFFERENCES), None)
+        beyond := next(
+            (one for one in sameness.differences if one.what not in BOUNDED_DIFFERENCE_KINDS), None
+        )
     ) is not None:
         return f"NOT {limit}{beyond.words}"
     frames = (sameness.as_written,) if sameness.as_written is not None else sameness.frames
