@@ -652,9 +652,9 @@ def changes_of_b(
 ) -> tuple[tuple[str, str], ...]:
     """Return the changes that bring B closest to A.
 
-    The function stores the tool poses in `alignment`. With `has_table` (A or B is a Denavit-Hartenberg table),
-    every displaced frame is reported as a tool. The frames of a Denavit-Hartenberg table depend on the
-    table's convention.
+    The function stores the tool poses in `alignment`. With `has_table` (A or B is a Denavit-Hartenberg
+    table), every displaced frame is reported as a tool. The frames of a Denavit-Hartenberg table depend on
+    the table's convention.
 
     Returns:
         (kind, text) of each change.
@@ -929,7 +929,7 @@ def limit_differences(
         a: The joint of A.
         b: The joint of B.
         tolerance: Relative tolerance; absolute if both values are below 1.
-        single: Relative rounding error of single precision; 0 for double precision.
+        single_roundoff: Relative rounding error of single precision; 0 for double precision.
         zero: (sign, offset); value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
