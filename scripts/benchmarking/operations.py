@@ -144,7 +144,7 @@ def _count_instruction(
 ) -> int:
     op, row, _, flags, c = instruction
     run.written.clear()
-    world = run.call.world_axes
+    world = run.call.select_world_axes
     if op <= Op.ROTATE:
         return count_shared(run.call._execute_transform(world, op, state, None, c))
     if op <= Op.FLOATING:
