@@ -20,7 +20,7 @@ from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
-from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, LEAST_UNIT
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMAL
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
@@ -117,8 +117,8 @@ def test_velocities_whose_squares_underflow_are_verified_with_a_small_bound(size
     plan = robot.plan([1])
     sizes = compute_magnitudes(plan, q, v, None, FIXED_BASE_STATE)
     bound = VELOCITY.bound(plan, sizes, urdfkin.Reference.LOCAL_WORLD_ALIGNED)
-    allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())
-    assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), LEAST_UNIT)
+    allowed = float((bound.k * np.maximum(EPS * bound.scale, SMALLEST_SUBNORMAL)).max())
+    assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), SMALLEST_SUBNORMAL)
 
 
 @pytest.mark.parametrize("size", [1e155, 1e160, 1e200, 1e300])

@@ -245,10 +245,10 @@ def _add_column_derivatives(scratch, program, i, first, end, reference):
         before = program[j + 1] <= program[i + 1]
         if reference == _ALIGNED:
             if before:
-                linear, angular = eq.turned_along(w_j, v_i, w_i)
+                linear, angular = eq.derivative_by_earlier_joint(w_j, v_i, w_i)
                 _add_six_vector(scratch, sum_j, linear, angular)
             else:
-                _add_six_vector(scratch, sum_j, eq.end_moved(w_i, v_j), _zero_vector())
+                _add_six_vector(scratch, sum_j, eq.derivative_by_later_joint(w_i, v_j), _zero_vector())
         elif reference == _WORLD and before:
             linear, angular = eq.motion_product(v_j, w_j, v_i, w_i)
             _add_six_vector(scratch, sum_j, linear, angular)

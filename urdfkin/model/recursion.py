@@ -220,7 +220,11 @@ class Recursion:
             case Reference.LOCAL:
                 change = change if before else eq.motion_product(*six, *by)
             case Reference.LOCAL_WORLD_ALIGNED:
-                change = eq.turned_along(by[1], *six) if before else (eq.end_moved(six[1], by[0]), ZERO)
+                change = (
+                    eq.derivative_by_earlier_joint(by[1], *six)
+                    if before
+                    else (eq.derivative_by_later_joint(six[1], by[0]), ZERO)
+                )
             case _:
                 assert_never(reference)
         return change
