@@ -16,10 +16,10 @@ from urdfkin.comparison.result import (
     Interval,
     Sameness,
     angle,
+    interval_text,
     length,
     limit_differences,
     size_words,
-    up_to,
 )
 from urdfkin.comparison.verdict import same
 from urdfkin.dh.table import DHTable
@@ -89,8 +89,8 @@ def format_value(value: Value | None) -> str:
 
 def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
     if frame.lower == 0.0:
-        return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
-    return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
+        return f"{turns} {frame.frame} by up to {interval_text(angle, frame.radians_seen, frame.radians)}"
+    return f"{moves} {frame.frame} by up to {interval_text(length, frame.lower, frame.upper)}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -601,13 +601,13 @@ def length(metres: float) -> str:
     return _with_prefix(metres, "m")
 
 
-def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
+def interval_text(format_size: Callable[[float], str], lower: float, upper: float) -> str:
     """Return an interval as text.
 
-    >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
+    >>> interval_text(length, 0.025, 0.025), interval_text(angle, 0.4297, 0.4327), interval_text(length, 1.0, math.inf)
     ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
     """
-    attained, most = words(lower), words(upper)
+    attained, most = format_size(lower), format_size(upper)
     if attained == most:
         return attained
     return f"{attained} ({most})" if math.isinf(upper) else f"{attained} (at most {most})"
