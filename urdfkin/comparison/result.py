@@ -604,8 +604,10 @@ def length(metres: float) -> str:
 def interval_text(format_size: Callable[[float], str], lower: float, upper: float) -> str:
     """Return an interval as text.
 
-    >>> interval_text(length, 0.025, 0.025), interval_text(angle, 0.4297, 0.4327), interval_text(length, 1.0, math.inf)
-    ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
+    >>> interval_text(length, 0.025, 0.025), interval_text(angle, 0.4297, 0.4327)
+    ('25 mm', '429.7 mrad (at most 432.7 mrad)')
+    >>> interval_text(length, 1.0, math.inf)
+    '1 m (without bound)'
     """
     attained, most = format_size(lower), format_size(upper)
     if attained == most:
