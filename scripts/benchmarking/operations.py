@@ -131,7 +131,7 @@ def count_operations(plan: CompiledTree, quantity: str) -> int:
     words: list[int] = program.words.tolist()
     angles = (words[ProgramHeader.ANGLES_END] - words[ProgramHeader.ANGLES]) // 4
     output = {"jacobian": "placement"}.get(quantity, quantity)
-    state = getattr(run.call, f"mask_for_{output}")(run.state)
+    state = getattr(run.call, f"state_for_{output}")(run.state)
     total, position = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
     while words[position] != Op.END:
         total += _count_instruction(run, words[position : position + INSTRUCTION_WIDTH], quantity, state)
