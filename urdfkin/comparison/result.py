@@ -820,7 +820,7 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
     for link, label in enumerate(alignment.a.labels):
         other = links_of_b.get(label)
         if other is not None and link not in matched and _is_on_matched_bodies(alignment, link, other):
-            ours, theirs = _carrier(tree_a, link), _carrier(tree_b, other)
+            ours, theirs = _carrier_name(tree_a, link), _carrier_name(tree_b, other)
             ordered.append(Difference(f"link {tree_a.links[link]}", "carried by", ours, theirs))
     return tuple(ordered)
 
@@ -835,7 +835,7 @@ def _is_on_matched_bodies(alignment: Alignment, link_a: int, link_b: int) -> boo
     )
 
 
-def _carrier(tree: KinematicTree, link: int) -> str:
+def _carrier_name(tree: KinematicTree, link: int) -> str:
     path = [tree.joints[i] for i in tree.path(link) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 

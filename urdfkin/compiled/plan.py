@@ -427,7 +427,7 @@ class _ProgramWriter:
         parts = (
             _needed_block_starts(plan.q_indices),
             _needed_block_starts(plan.columns[:, ColumnField.V].tolist()),
-            self._angle_entries(),
+            self._program_angles(),
         )
         self.lists = [number for part in parts for number in part]
         begins = np.cumsum([len(ProgramHeader), *map(len, parts)]).tolist()
@@ -516,7 +516,7 @@ class _ProgramWriter:
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._add_constants(multiplier, constant)
 
-    def _angle_entries(self) -> list[int]:
+    def _program_angles(self) -> list[int]:
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = JointMotion(step[StepField.KIND]), self.q + int(step[StepField.Q])

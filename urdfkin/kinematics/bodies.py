@@ -313,13 +313,13 @@ def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
 ) -> FloatArray:
     """Return the manipulator Jacobian J = C^-1 J_v (7.122)."""
-    return pose_rate_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
+    return pose_rate_inverse(representation, R, nearest) @ _as_matrices_with_rows(J_v, "J_v", 6)
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
     """Return the velocity Jacobian J_v = C J (7.121)."""
     C = pose_rate_matrix(representation, R)
-    return C @ _rows(J, "J", C.shape[-1])
+    return C @ _as_matrices_with_rows(J, "J", C.shape[-1])
 
 
 def pose_rates(
@@ -345,7 +345,7 @@ def _block_diagonal(lower: FloatArray) -> FloatArray:
     return C
 
 
-def _rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
+def _as_matrices_with_rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
     array = as_finite(value, name)
     columns = array.shape[-1] if array.ndim else 0
     return as_matrices(array, name, rows, columns)
