@@ -131,7 +131,7 @@ def count_operations(plan: CompiledTree, quantity: str) -> int:
     words: list[int] = program.words.tolist()
     angles = (words[ProgramHeader.ANGLES_END] - words[ProgramHeader.ANGLES]) // 4
     output = {"jacobian": "placement"}.get(quantity, quantity)
-    state = getattr(run.call, f"mask_for_{output}")(run.state)
+    state = getattr(run.call, f"state_for_{output}")(run.state)
     total, position = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
     while words[position] != Op.END:
         total += _count_instruction(run, words[position : position + INSTRUCTION_WIDTH], quantity, state)
@@ -144,7 +144,7 @@ def _count_instruction(
 ) -> int:
     op, row, _, flags, c = instruction
     run.written.clear()
-    world = run.call.world_axes
+    world = run.call.select_world_axes
     if op <= Op.ROTATE:
         return count_shared(run.call._execute_transform(world, op, state, None, c))
     if op <= Op.FLOATING:

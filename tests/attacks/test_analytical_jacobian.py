@@ -44,8 +44,8 @@ def free() -> Robot:
 def test_an_error_in_the_rate_matrix_is_caught(
     ur5: Robot, representation: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = module.representation_inverse
-    monkeypatch.setattr(module, "representation_inverse", lambda *x: right(*x) * factor)
+    right = module.pose_rate_inverse
+    monkeypatch.setattr(module, "pose_rate_inverse", lambda *x: right(*x) * factor)
     with pytest.raises(urdfkin.VerificationError, match="analytical jacobian"):
         ur5.analytical_jacobian(ur5.sample(5, 3), "tool0", representation)
 
@@ -66,9 +66,9 @@ def test_the_line_that_reproduces_an_error_calls_analytical_jacobian(
     moving: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = urdfkin.load("ur5")
-    q, right = robot.sample(3, 1), module.representation_inverse
+    q, right = robot.sample(3, 1), module.pose_rate_inverse
     base = BaseMotion(np.array([[0, -1, 0, 3], [1, 0, 0, 2], [0, 0, 1, 1], [0, 0, 0, 1]])) if moving else None
-    monkeypatch.setattr(module, "representation_inverse", lambda *x: 1.001 * right(*x))
+    monkeypatch.setattr(module, "pose_rate_inverse", lambda *x: 1.001 * right(*x))
     with pytest.raises(urdfkin.VerificationError) as caught:
         robot.analytical_jacobian(q, "tool0", "XYX", base=base)
     line = caught.value.reproduce
@@ -121,12 +121,12 @@ def test_near_the_singularity_the_analytical_jacobian_is_verified_and_the_bound_
 def test_an_error_far_above_rounding_is_caught_near_the_singularity(
     free: Robot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = module.representation_inverse
+    right = module.pose_rate_inverse
     for distance in (1e-1, 1e-2, 1e-3):
         middle = distance if name == "ZYZ" else np.pi / 2 - distance
         quat = quaternion_of(rotation_from_euler(name, [0.4, middle, 0.9]))
         mistake = 200.0 * 24.0 * EPS / distance
-        monkeypatch.setattr(module, "representation_inverse", lambda *x, s=mistake: right(*x) * (1.0 + s))
+        monkeypatch.setattr(module, "pose_rate_inverse", lambda *x, s=mistake: right(*x) * (1.0 + s))
         with pytest.raises(urdfkin.VerificationError):
             free.analytical_jacobian([0.0, 0.0, 0.0, *quat], "body", name)
         monkeypatch.undo()

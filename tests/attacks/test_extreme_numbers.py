@@ -17,10 +17,10 @@ from tests.urdfs import robot as robot_of
 from urdfkin.compiled import breakdown
 from urdfkin.compiled.breakdown import AccelerationBreakdown
 from urdfkin.compiled.plan import LANES
-from urdfkin.compiled.python_numbers import LARGE
+from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMAL
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
@@ -117,8 +117,8 @@ def test_velocities_whose_squares_underflow_are_verified_with_a_small_bound(size
     plan = robot.plan([1])
     sizes = compute_magnitudes(plan, q, v, None, FIXED_BASE_STATE)
     bound = VELOCITY.bound(plan, sizes, urdfkin.Reference.LOCAL_WORLD_ALIGNED)
-    allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())
-    assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), LEAST_UNIT)
+    allowed = float((bound.k * np.maximum(EPS * bound.scale, SMALLEST_SUBNORMAL)).max())
+    assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), SMALLEST_SUBNORMAL)
 
 
 @pytest.mark.parametrize("size", [1e155, 1e160, 1e200, 1e300])
@@ -283,7 +283,7 @@ def test_overflow_from_a_huge_link_raises_range_error() -> None:
 def test_huge_finite_results_are_returned(ur5: Robot, method: str) -> None:
     # A power of two scales each product exactly, so the results differ only by this factor.
     factor = 2.0**450
-    assert factor > LARGE
+    assert factor > NO_OVERFLOW_BOUND
     q, v = ur5.sample(5, 2), np.random.default_rng(3).normal(size=(5, 6))
     slow, fast = (METHODS[method](ur5, q, v * f, v * f * f, verify=False) for f in (1.0, factor))
     if isinstance(slow, np.ndarray) and isinstance(fast, np.ndarray):
@@ -295,8 +295,8 @@ def test_huge_finite_results_are_returned(ur5: Robot, method: str) -> None:
 
 
 def test_nothing_overflows_below_the_limit() -> None:
-    # The bound on w^2 d from the comment of LARGE, for a robot of ten thousand joints.
-    assert np.isfinite(4.0 * 10_000**3 * LARGE**6)
+    # The bound on w^2 d from the comment of `NO_OVERFLOW_BOUND`, for a robot of ten thousand joints.
+    assert np.isfinite(4.0 * 10_000**3 * NO_OVERFLOW_BOUND**6)
 
 
 # -- quaternions of URDF 1.1 in the accuracy study -----------------------------------------------------

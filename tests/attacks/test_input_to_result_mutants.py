@@ -68,7 +68,7 @@ CHANGES = [
     ("compiled.plan._ProgramWriter._add_columns",
      "int(self.plan.columns[c, ColumnField.IS_ROTATION]) + 2 * (to != c)",
      "int(self.plan.columns[c, ColumnField.IS_ROTATION])"),
-    ("compiled.plan._ProgramWriter._angle_entries", "int(self.rules[i] > 0)", "0"),
+    ("compiled.plan._ProgramWriter._program_angles", "int(self.rules[i] > 0)", "0"),
     ("compiled.plan._anchors", "axis_pose(joint).T", "axis_pose(joint)"),
     ("compiled.plan._steps",
      "anchors[joint.parent].T @ joint.T_parent_joint", "joint.T_parent_joint @ anchors[joint.parent].T"),

@@ -99,7 +99,7 @@ def test_a_compiled_tree_has_the_joints_and_depths_of_the_paths_to_its_frames() 
     assert plan.depth.tolist() == [len(path) for path in paths]
     wanted = sorted({i for path in paths for i in path if robot.tree.joints[i].kind.nv})
     assert list(plan.joints) == wanted
-    for (_, place), independent_joints in zip(plan.frames, plan.sum_columns, strict=True):
+    for (_, place), independent_joints in zip(plan.frames, plan.target_columns, strict=True):
         own = {wanted.index(i) for i in paths[place] if i in wanted}
         assert {
             int(plan.columns[c, 0]) for c in range(len(plan.columns)) if independent_joints[c] >= 0

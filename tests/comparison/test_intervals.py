@@ -219,12 +219,13 @@ def test_the_bound_of_a_box_by_first_derivatives_is_not_less_than_the_corners(va
 def test_the_jacobian_of_a_tool_point_agrees_with_finite_differences(tool: tuple[float, ...]) -> None:
     arm, none = robot("panda"), cast(BoxBounds, None)  # the point depends on no box
     q, step = arm.sample(5, seed=1), 1e-6
-    p, J = BoxBounds._origin(none, arm, q, "panda_hand", np.array(tool))
+    p, J = BoxBounds._position_and_jacobian(none, arm, q, "panda_hand", np.array(tool))
     expected = arm.placement(q, "panda_hand") @ [*tool, 1.0]
     np.testing.assert_allclose(p, expected[:, :3], atol=1e-14)
     for i, h in enumerate(step * np.eye(arm.nv)):
         ahead, behind = (
-            BoxBounds._origin(none, arm, x, "panda_hand", np.array(tool))[0] for x in (q + h, q - h)
+            BoxBounds._position_and_jacobian(none, arm, x, "panda_hand", np.array(tool))[0]
+            for x in (q + h, q - h)
         )
         np.testing.assert_allclose((ahead - behind) / (2.0 * step), J[..., i], atol=1e-9)
 
@@ -243,8 +244,8 @@ def test_with_many_differences_the_upper_bound_is_tightened_close_to_the_lower_b
     upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE_GRID)
     assert upper > 1.6 * lower
     assert tighten(search, frame, 1.05 * lower, upper) == 1.05 * lower
-    assert tighten(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
-    assert tighten(search, frame, 1.05 * lower, upper, most=0) == upper
+    assert tighten(search, frame, 0.99 * lower, upper, max_boxes=2**14) > lower, "what is wrong is not proven"
+    assert tighten(search, frame, 1.05 * lower, upper, max_boxes=0) == upper
 
 
 def two_turns(place: str, inside: str) -> Robot:

@@ -10,7 +10,7 @@ import urdfkin
 from tests.odd_tree import odd_tree, pose, state
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.breakdown import ACCELERATION_KINDS, acceleration_breakdown
-from urdfkin.compiled.evaluate import accelerations, compute_in_blocks
+from urdfkin.compiled.evaluate import accelerations, compute_in_threads
 from urdfkin.compiled.plan import LANES, compile_tree
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.model.base_motion import BaseMotion
@@ -76,7 +76,7 @@ def test_an_error_in_the_rows_of_any_thread_is_reported() -> None:
         if bad is not None:
             q[bad] = 1.0
         for threads in (1, 2):
-            assert compute_in_blocks(compute, [base, q], out, threads) == int(bad is not None)
+            assert compute_in_threads(compute, [base, q], out, threads) == int(bad is not None)
             np.testing.assert_array_equal(out[:, 0], q[:, 0])
 
 

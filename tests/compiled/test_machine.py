@@ -167,7 +167,7 @@ def test_an_unpickled_plan_has_its_own_addresses() -> None:
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one, other)
     assert len(rubbish) == 200
-    assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.sum_columns))
+    assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.target_columns))
 
 
 # -- sine and cosine, compared at fifty digits -----------------------------------------------------

@@ -288,9 +288,11 @@ def test_the_sines_and_cosines_of_the_c_code_have_errors_of_at_most_one_eps(
     assert 0.3 < float(error.max()) / np.finfo(kind).eps < 0.5 * SINE
     # The error of a small sine of a large angle can be eps, more than eps times the sine.
     # So the bound in single precision needs both terms.
-    within = roundings.SINGLE_OPERATION["sin"] * np.finfo(kind).eps * np.abs([np.sin(wide), np.cos(wide)])
+    within = (
+        roundings.SINGLE_OPERATION_ERRORS["sin"] * np.finfo(kind).eps * np.abs([np.sin(wide), np.cos(wide)])
+    )
     assert np.any(error > within) == (kind is np.float32)
-    assert SINE == 2.0 * roundings.SINGLE_POLYNOMIAL
+    assert SINE == 2.0 * roundings.SINGLE_POLYNOMIAL_ERROR
 
 
 def test_at_most_half_an_eps_of_the_largest_number_is_omitted_from_a_constant() -> None:

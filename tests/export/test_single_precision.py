@@ -20,7 +20,7 @@ from urdfkin.export import function as export_function
 from urdfkin.export import proof
 from urdfkin.export.expression import Graph, Node
 from urdfkin.export.function import Function, single_bounds
-from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
+from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION_ERRORS
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.exact.numbers import conversion_errors
@@ -98,8 +98,8 @@ def test_the_bound_of_an_operation_holds_and_fails_without_the_term_of_the_opera
     op: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert (0.9 if op in ("sin", "cos") else 0.2) < worst(OPERATIONS[op]) <= 1.0
-    monkeypatch.setitem(SINGLE_OPERATION, op, 0.0)
-    monkeypatch.setattr(export_function, "SINGLE_POLYNOMIAL", 0.0)
+    monkeypatch.setitem(SINGLE_OPERATION_ERRORS, op, 0.0)
+    monkeypatch.setattr(export_function, "SINGLE_POLYNOMIAL_ERROR", 0.0)
     assert worst(OPERATIONS[op]) > 1.0
 
 

@@ -20,8 +20,8 @@ from urdfkin.kinematics.bodies import (
     planar_rotation_derivative,
     point_acceleration,
     point_velocity,
+    pose_rate_matrix,
     pose_rates,
-    representation_matrix,
     velocity_jacobian,
     velocity_of_pose_rates,
 )
@@ -72,7 +72,7 @@ def test_7_119_C_converts_the_rates_of_x_to_velocities() -> None:
 
 
 def test_7_120_C_has_the_identity_and_omega_on_its_diagonal() -> None:
-    C = representation_matrix("ZYZ", R_06)
+    C = pose_rate_matrix("ZYZ", R_06)
     assert np.array_equal(C[:3], np.eye(3, 6))
     assert not C[3:, :3].any()
     assert close(C[3:, 3:], euler_rate_matrix("ZYZ", euler_of("ZYZ", R_06)))
@@ -87,7 +87,7 @@ def test_7_121_the_velocity_jacobian_is_C_times_the_manipulator_jacobian() -> No
 def test_7_122_the_manipulator_jacobian_is_the_inverse_of_C_times_the_velocity_jacobian() -> None:
     J_v = robot("elbow").jacobian(MOVING.q, "wrist")
     J = analytical_jacobian("ZYZ", R_06, J_v)
-    assert close(J, np.linalg.solve(representation_matrix("ZYZ", R_06), J_v), 16.0)
+    assert close(J, np.linalg.solve(pose_rate_matrix("ZYZ", R_06), J_v), 16.0)
     assert close(J @ MOVING.v, array(rate(lambda t: pose(MOVING, t), 0.0)), 8.0)
 
 

@@ -469,9 +469,9 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     this one entry of v is 1, and that all other entries of v are 0. `urdfkin jacobian` prints angular
     velocities instead.
     """
-    from urdfkin.kinematics.rotation import NEAREST
+    from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 
-    x, nearest = _read_options(), NEAREST if nearest is None else nearest
+    x, nearest = _read_options(), MIN_SINGULARITY_DISTANCE if nearest is None else nearest
     with report_compilation():
         J = x.robot.analytical_jacobian(x.q, x.frame, representation, nearest=nearest, base=x.base)
     if x.conversion is not None:

@@ -53,10 +53,10 @@ CORNER_SAMPLES = 128
 #: The search looks for the largest distance.
 STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
-VALUES_PER_STEP = 13
+TRIALS_PER_STEP = 13
 FRAMES_PER_BATCH = 24
 #: Width of the search interval in each round, as a fraction of the coordinate's range.
-WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
+SEARCH_WIDTHS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
 PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
@@ -220,7 +220,7 @@ class DistanceSearch:
             largest += self._maximize(batch, z[np.argsort(-distances, axis=0)[:STARTING_POINTS].T])
         return largest
 
-    def largest_rotation(self, frame: FramePair) -> FloatArray:
+    def values_of_largest_rotation(self, frame: FramePair) -> FloatArray:
         z = self.sample_distances([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
         turned = [pose_difference(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
@@ -236,31 +236,29 @@ class DistanceSearch:
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
-        best = self._own_distances(z[:, :, np.newaxis], frames)[..., 0]
-        steps = np.linspace(-0.5, 0.5, VALUES_PER_STEP)
-        for window in WINDOWS:
+        best = self._distances_per_frame(z[:, :, np.newaxis], frames)[..., 0]
+        steps = np.linspace(-0.5, 0.5, TRIALS_PER_STEP)
+        for width in SEARCH_WIDTHS:
             for turn in range(max(map(len, variables))):
-                i = np.array([own[turn % len(own)] if own else 0 for own in variables])
+                i = np.array([indices[turn % len(indices)] if indices else 0 for indices in variables])
                 span = (high - low)[i][:, np.newaxis]
-                middle = (
-                    ((low + high) / 2.0)[i][:, np.newaxis] if window == 1.0 else z[k, s, i[:, np.newaxis]]
-                )
-                values = middle[..., np.newaxis] + window * span[..., np.newaxis] * steps
+                middle = ((low + high) / 2.0)[i][:, np.newaxis] if width == 1.0 else z[k, s, i[:, np.newaxis]]
+                values = middle[..., np.newaxis] + width * span[..., np.newaxis] * steps
                 values = np.clip(
                     values, low[i][:, np.newaxis, np.newaxis], high[i][:, np.newaxis, np.newaxis]
                 )
-                tried = np.repeat(z[:, :, np.newaxis], VALUES_PER_STEP, axis=2)
-                place = k[..., np.newaxis], s[..., np.newaxis], np.arange(VALUES_PER_STEP)
+                tried = np.repeat(z[:, :, np.newaxis], TRIALS_PER_STEP, axis=2)
+                place = k[..., np.newaxis], s[..., np.newaxis], np.arange(TRIALS_PER_STEP)
                 tried[*place, i[:, np.newaxis, np.newaxis]] = values
-                distances = self._own_distances(tried, frames)
-                at = distances.argmax(axis=2)
-                better = distances[k, s, at] > best
-                z = np.where(better[..., np.newaxis], tried[k, s, at], z)
-                best = np.where(better, distances[k, s, at], best)
-        at = best.argmax(axis=1)
-        return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
+                distances = self._distances_per_frame(tried, frames)
+                best_trial = distances.argmax(axis=2)
+                better = distances[k, s, best_trial] > best
+                z = np.where(better[..., np.newaxis], tried[k, s, best_trial], z)
+                best = np.where(better, distances[k, s, best_trial], best)
+        best_start = best.argmax(axis=1)
+        return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
-    def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+    def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return the distances of frame k at the values `z[k]`.
 
         Args:
@@ -293,10 +291,10 @@ class DistanceSearch:
 
 
 def own_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
-    return placements(*_flat_inputs(robot, q, frames))
+    return placements(*_plan_and_q(robot, q, frames))
 
 
-def _flat_inputs(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[CompiledTree, FloatArray]:
+def _plan_and_q(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[CompiledTree, FloatArray]:
     tree = robot.tree
     return robot.plan([tree.frame_link(frame) for frame in frames]), with_unit_quaternions(tree, q)
 
@@ -370,31 +368,31 @@ class BoxBounds:
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
-        p_a, J_a = self._origin(a, q_a, self.frames[0], np.zeros(3))
-        p_b, J_b = self._origin(b, q_b, self.frames[1], self.tool)
+        p_a, J_a = self._position_and_jacobian(a, q_a, self.frames[0], np.zeros(3))
+        p_b, J_b = self._position_and_jacobian(b, q_b, self.frames[1], self.tool)
         R, p = self.T_a_b[:3, :3], self.T_a_b[:3, 3]
         return p_b @ R.T + p - p_a, R @ (J_b @ self.rates[1]) - J_a @ self.rates[0]
 
-    def _origin(
-        self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
+    def _position_and_jacobian(
+        self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return a point's position and Jacobian.
 
-        `tool` (3,) contains the point's coordinates in `frame`, m.
+        `point` (3,) contains the point's coordinates in `frame`, m.
 
         Returns:
             (n, 3) position, and (n, 3, nv) Jacobian.
         """
-        inputs = _flat_inputs(robot, q, [frame])
+        inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
-        if not tool.any():
+        if not point.any():
             return T[:, :3, 3], J[:, :3]
-        lever = T[:, :3, :3] @ tool
+        lever = T[:, :3, :3] @ point
         return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
 
 
 def tighten(
-    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MAX_BOXES
+    search: DistanceSearch, frame: FramePair, target: float, upper: float, max_boxes: int = MAX_BOXES
 ) -> float:
     """Try to prove a smaller upper bound on a frame's distance.
 
@@ -403,34 +401,34 @@ def tighten(
         frame: Matching frames.
         target: Bound at which the proof ends, m.
         upper: A proven bound, m.
-        most: Maximum number of boxes in memory.
+        max_boxes: Maximum number of boxes in memory.
 
     Returns:
         A proven bound, m; `upper` if no smaller bound is proven.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
-    some = [pair for pair in pairs if pair is not None]
+    moving_pairs = [pair for pair in pairs if pair is not None]
     # An unlimited revolute joint repeats its poses after one turn.
     # Boxes cover an unlimited range only for revolute joints with the multiplier 1 or -1.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
-        for step, pair in zip(steps, some, strict=False)
+        for step, pair in zip(steps, moving_pairs, strict=False)
         for line in (pair.a, pair.b)
         if line.slope and math.inf in np.abs(variables.ranges[line.variable])
     )
-    is_possible = len(some) == len(pairs) and all(search.base_fixed) and ranges_are_covered
+    is_possible = len(moving_pairs) == len(pairs) and all(search.base_fixed) and ranges_are_covered
     if not target < upper < math.inf or not is_possible:
         return upper
-    names, M = curvature_bounds(steps, some, variables, frame)
+    names, M = curvature_bounds(steps, moving_pairs, variables, frame)
     boxes = BoxBounds(search, frame, names)
     ends = search.ends[boxes.at]
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
-    if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
+    if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > max_boxes:
         return upper
     if not names:  # The distance is constant.
         return min(upper, float(boxes.bounds(c, h)[0]))
-    while len(c) and 2 * len(c) <= most:
+    while len(c) and 2 * len(c) <= max_boxes:
         i = _worst_variable(h, M)
         h[i] /= 2.0
         c, proven = np.repeat(c, 2, axis=0), np.repeat(proven, 2)

@@ -48,7 +48,7 @@ _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: The relative tolerance of a bound is this number times the machine epsilon.
 _BOUND_TOLERANCE = 64.0
 #: `recheck` computes these entries again, and compares the results with the certificate.
-DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
+RECOMPUTED_ENTRIES = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
 class CertifiedModel(TypedDict):
@@ -246,7 +246,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
         "command": command,
         "a": a,
         "b": b,
-        **{name: getattr(result, name) for name in _COPIED},
+        **{name: getattr(result, name) for name in _COPIED_ATTRIBUTES},
         "checked": result.confirmation,
         "rounding": dict(zip(("metres", "radians"), result.rounding, strict=True)),
     }
@@ -254,7 +254,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
 
 
 #: The certificate copies these attributes of `Sameness`, under the same names.
-_COPIED = (
+_COPIED_ATTRIBUTES = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",
 )  # fmt: skip
@@ -315,7 +315,7 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
         if (claim := claims.pop(names, None)) is None:
             yield f"frame {names[0]} has no interval"
         else:
-            yield from _interval_errors(search, frame, claim, result.rounding, sharply=not wrong)
+            yield from _interval_errors(search, frame, claim, result.rounding, use_branch_and_bound=not wrong)
     yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
     if document["verdict"] == Verdict.DIFFERS.value and not wrong:
         other = comparator.alignment()
@@ -323,7 +323,9 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
         if better is not Verdict.DIFFERS:
             yield f"`verdict`: another alignment of B with A gives {better.value}, not differs"
     if result.after:
-        yield from _as_written_errors(document["as_written"], comparator, alignment, sharply=not wrong)
+        yield from _as_written_errors(
+            document["as_written"], comparator, alignment, use_branch_and_bound=not wrong
+        )
     elif document["as_written"] is not None:
         yield "`as_written`: B needs no changes, so this entry must be null"
     yield from _confirmation_errors(document["checked"], comparator, alignment, variables)
@@ -354,7 +356,7 @@ def _statement_errors(document: SameCertificate, comparator: Comparator, result:
         yield f"`verdict`: the models give {result.verdict.value}, not {document['verdict']}"
     yield from (
         f"`{name}`: the models give a different entry"
-        for name in DERIVED
+        for name in RECOMPUTED_ENTRIES
         if not _equal(dict(document)[name], dict(correct)[name])
     )
 
@@ -450,7 +452,7 @@ def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
 
 
 def _as_written_errors(
-    claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, sharply: bool
+    claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, use_branch_and_bound: bool
 ) -> Iterator[str]:
     written = comparator.align_as_written(alignment)
     if claim is None:
@@ -469,7 +471,7 @@ def _as_written_errors(
     if claim["upper"] is not None and distances.max() > claim["upper"] + rounding[0]:
         farthest = links[0][written.frames[int(distances.argmax())].a]
         yield f"`as_written`: frame {farthest} has a larger distance, {distances.max():.6g} m"
-    problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
+    problems = _interval_errors(search, frame, claim, rounding, use_branch_and_bound=use_branch_and_bound)
     yield from (f"`as_written`: {line}" for line in problems)
 
 
@@ -479,22 +481,22 @@ def _interval_errors(
     claim: FrameEntry,
     rounding: tuple[float, float],
     *,
-    sharply: bool,
+    use_branch_and_bound: bool,
 ) -> Iterator[str]:
     """Yield an error for each wrong or unproven bound.
 
-    `rounding` contains a distance (m) and an angle (rad). If `sharply` is true, the check may use branch and
-    bound.
+    `rounding` contains a distance (m) and an angle (rad). If `use_branch_and_bound` is true, the check may
+    use branch and bound.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)
     yield from problems
-    most = math.inf if claim["upper"] is None else claim["upper"]
-    widest = math.inf if claim["radians"] is None else claim["radians"]
-    if claim["lower"] > most or claim["radians_seen"] > widest:
+    upper = math.inf if claim["upper"] is None else claim["upper"]
+    upper_angle = math.inf if claim["radians"] is None else claim["radians"]
+    if claim["lower"] > upper or claim["radians_seen"] > upper_angle:
         yield f"frame {claim['frame']}: a lower bound is larger than the upper bound"
-    metres, radians = most - rounding[0], widest - rounding[1]
+    metres, radians = upper - rounding[0], upper_angle - rounding[1]
     for grid in (COARSE_GRID, FINE_GRID):
         proven = math.inf, math.inf
         if not search.unbounded:
@@ -505,7 +507,7 @@ def _interval_errors(
         return
     place = f"frame {claim['frame']}"
     if _within(proven[1], radians, rounding[1]):
-        if problems or not sharply:
+        if problems or not use_branch_and_bound:
             return
         attained = max(claim["lower"], float(search.sample_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:

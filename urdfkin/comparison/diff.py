@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 from urdfkin.comparison.result import (
-    BOUNDED_DIFFERENCES,
+    BOUNDED_DIFFERENCE_KINDS,
     Difference,
     Interval,
     Sameness,
     angle,
+    interval_text,
     length,
     limit_differences,
     size_words,
-    up_to,
 )
 from urdfkin.comparison.verdict import same
 from urdfkin.dh.table import DHTable
@@ -89,8 +89,8 @@ def format_value(value: Value | None) -> str:
 
 def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
     if frame.lower == 0.0:
-        return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
-    return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
+        return f"{turns} {frame.frame} by up to {interval_text(angle, frame.radians_seen, frame.radians)}"
+    return f"{moves} {frame.frame} by up to {interval_text(length, frame.lower, frame.upper)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,14 +199,18 @@ def _diff_across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
 
 
 def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelChange]:
-    for at in result.unexplained:
-        if at.what and at.a is None:
-            yield ModelChange(at.place, at.what, None, None, str(at.b))
-        elif at.what:
-            yield ModelChange(at.place, at.what, at.a, at.b)
-    yield from _differences_in_size(result)
+    for joint_difference in result.unexplained:
+        if joint_difference.what and joint_difference.a is None:
+            yield ModelChange(
+                joint_difference.place, joint_difference.what, None, None, str(joint_difference.b)
+            )
+        elif joint_difference.what:
+            yield ModelChange(
+                joint_difference.place, joint_difference.what, joint_difference.a, joint_difference.b
+            )
+    yield from _changes_with_size(result)
     for one in result.differences:
-        if one.what not in BOUNDED_DIFFERENCES or one.what == "fixed":
+        if one.what not in BOUNDED_DIFFERENCE_KINDS or one.what == "fixed":
             yield from _change_of(one)
     for pair in result.joints:
         if pair.b not in spellings(pair.a) and pair.a not in spellings(pair.b):
@@ -216,8 +220,8 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
             for tree, name in zip(result.trees, (pair.a, pair.b), strict=True)
         )
         if a.kind.nv == b.kind.nv and a.kind.turns == b.kind.turns:
-            single = SINGLE_ROUNDOFF if result.single else 0.0
-            for one in limit_differences(a, b, result.rounding[1], single):
+            single_roundoff = SINGLE_ROUNDOFF if result.single else 0.0
+            for one in limit_differences(a, b, result.rounding[1], single_roundoff):
                 yield from _change_of(one)
     # Readers of MJCF and USD add the root link "world".
     roots = [tree.links[0] for tree, name in zip(result.trees, formats, strict=True) if name != "URDF"]
@@ -228,7 +232,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
             )
 
 
-def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
+def _changes_with_size(result: Sameness) -> Iterator[ModelChange]:
     """Yield the differences that `same` finds if the joints cannot be compared one by one."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
@@ -236,21 +240,21 @@ def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
     for words in result.after:
         yield ModelChange("robot", "as a whole", None, None, words)
     for one in result.differences:
-        if one.what in BOUNDED_DIFFERENCES - {"fixed"} and one.place not in listed:
+        if one.what in BOUNDED_DIFFERENCE_KINDS - {"fixed"} and one.place not in listed:
             yield ModelChange(one.place, one.what, *one.values, size_words(one.metres, one.radians))
 
 
-def _change_of(one: Difference) -> Iterator[ModelChange]:
-    if one.what not in ("only in A", "only in B"):
-        yield ModelChange(one.place, one.what, *one.values)
+def _change_of(difference: Difference) -> Iterator[ModelChange]:
+    if difference.what not in ("only in A", "only in B"):
+        yield ModelChange(difference.place, difference.what, *difference.values)
         return
-    names = [one.place]
-    if one.place.startswith("links "):
-        links = one.a if one.what == "only in A" else one.b
+    names = [difference.place]
+    if difference.place.startswith("links "):
+        links = difference.a if difference.what == "only in A" else difference.b
         names = [f"link {name}" for name in links] if isinstance(links, tuple) else []
     for name in names:
         tag = name.partition(" ")[0]
-        old, new = (tag, None) if one.what == "only in A" else (None, tag)
+        old, new = (tag, None) if difference.what == "only in A" else (None, tag)
         yield ModelChange(name, "", old, new)
 
 

@@ -145,8 +145,8 @@ def _compare_reader(
     case = {"name": robot.name, "text": source, "configurations": values}
     output, status = run_python([*command, name], json.dumps([case]).encode(), _TIMEOUT, _MAX_BYTES)
     if status != 0 or not output:
-        how = f"no answer in {_TIMEOUT:g} s" if status is None else f"its process ended with {status}"
-        return LibraryReading(title, number, how)
+        reason = f"no answer in {_TIMEOUT:g} s" if status is None else f"its process ended with {status}"
+        return LibraryReading(title, number, reason)
     answer = json.loads(output)
     if "error" in answer:
         return LibraryReading(title, number, escape_unprintable(answer["error"])[:_MAX_CHARACTERS])
@@ -166,21 +166,23 @@ def _compare_reader(
     worst = float(np.abs(theirs - ours[:, shared]).max())
     poses_of = dict(zip(shared, theirs.swapaxes(0, 1), strict=True))
     elements = _joint_elements(source) if form == "urdf" else {}
-    own = [joint for joint in answer["joints"] if joint in values[0]]
-    new = (joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements)
-    added = next(new, None)
+    shared_joints = [joint for joint in answer["joints"] if joint in values[0]]
+    joints_without_element = (
+        joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements
+    )
+    added_joint = next(joints_without_element, None)
     return LibraryReading(
         title,
         number,
         joints=tuple(answer["joints"]),
-        same_order=answer["joints"] == [name for name in values[0] if name != added],
+        same_order=answer["joints"] == [name for name in values[0] if name != added_joint],
         missing=tuple(
             link
             for i, link in enumerate(links)
-            if i not in shared and (i or not added) and (form != "usd" or link in robot.prims)
+            if i not in shared and (i or not added_joint) and (form != "usd" or link in robot.prims)
         ),
         worst=0.0 if worst <= tolerance else worst,
-        differences=tuple(_differences(robot, title, ours, poses_of, elements, own, tolerance)),
+        differences=tuple(_differences(robot, title, ours, poses_of, elements, shared_joints, tolerance)),
     )
 
 
@@ -229,7 +231,7 @@ def _differences(
     ours: FloatArray,
     theirs: Mapping[int, FloatArray],
     elements: Mapping[str, Any],
-    own: Sequence[str],
+    shared_joints: Sequence[str],
     tolerance: float,
 ) -> Iterator[ReaderDifference]:
     for i, joint in enumerate(robot.tree.joints, 1):
@@ -239,12 +241,19 @@ def _differences(
         T_theirs = np.linalg.inv(theirs[joint.parent]) @ theirs[i]
         size = float(np.abs(T - T_theirs).max())
         if not size <= tolerance:
-            element, words = _find_cause(joint, T, T_theirs, elements.get(joint.name), own, tolerance)
+            element, words = _find_cause(
+                joint, T, T_theirs, elements.get(joint.name), shared_joints, tolerance
+            )
             yield ReaderDifference(joint.name, element, f"{title} {words}", size)
 
 
 def _find_cause(
-    joint: Joint, T: FloatArray, T_theirs: FloatArray, element: Any, own: Sequence[str], tolerance: float
+    joint: Joint,
+    T: FloatArray,
+    T_theirs: FloatArray,
+    element: Any,
+    shared_joints: Sequence[str],
+    tolerance: float,
 ) -> tuple[str, str]:
     """Return the cause of a difference.
 
@@ -264,9 +273,11 @@ def _find_cause(
         return f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has a different rotation at q = 0"
     if difference[0].max() > tolerance:
         return "origin xyz", "has a different position at q = 0"
-    if joint.name in own and joint.kind.has_axis:
+    if joint.name in shared_joints and joint.kind.has_axis:
         return "axis", _describe_motion(joint, T, T_theirs, tolerance)
-    words = "moves the joint differently" if joint.name in own else "has no coordinate for the joint"
+    words = (
+        "moves the joint differently" if joint.name in shared_joints else "has no coordinate for the joint"
+    )
     return f"type {joint.kind.value}", words
 
 

@@ -60,7 +60,7 @@ class Verdict(Enum):
 #: The printed verdict lists the kinds in this order.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between matching frames has an upper bound.
-BOUNDED_DIFFERENCES = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
+BOUNDED_DIFFERENCE_KINDS = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +261,7 @@ class Tool:
 #: "not asked" means that the user requested no check.
 #: "not verified" means that Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
-_WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
+_STATE_TEXTS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,7 +282,7 @@ class Confirmation:
 
     def __str__(self) -> str:
         if self.state != "confirmed":
-            return f"{_WORDS[self.state]}: {self.reason}"
+            return f"{_STATE_TEXTS[self.state]}: {self.reason}"
         at = f"at {self.configurations} configurations"
         return f"{self.by} finds at most {self.metres:.2g} m {at}, within the bounds"
 
@@ -452,7 +452,7 @@ class Sameness(Displayable):
         """
         if self.single is None or self.verdict is not Verdict.DIFFERS:
             return False
-        explained = {one.what for one in self.differences} <= BOUNDED_DIFFERENCES
+        explained = {one.what for one in self.differences} <= BOUNDED_DIFFERENCE_KINDS
         return (
             explained
             and self.bound_as_written[0] <= self.single[0]
@@ -465,14 +465,15 @@ class Sameness(Displayable):
         The models are compared without the changes in `after`, at equal coordinates. A root coincides with
         the other model's link of the same name, if this link is on the root body; otherwise, the roots
         coincide. Different base poses, tool frames and joint zeros can therefore increase the distance. The
-        result is False if `differences` contains a kind outside `BOUNDED_DIFFERENCES`, such as "only in A".
+        result is False if `differences` contains a kind outside `BOUNDED_DIFFERENCE_KINDS`, such as "only in
+        A".
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
         >>> found.within(0.01), found.within(1.0)
         (False, True)
         """
-        return {one.what for one in self.differences} <= BOUNDED_DIFFERENCES and max(
+        return {one.what for one in self.differences} <= BOUNDED_DIFFERENCE_KINDS and max(
             self.bound_as_written
         ) <= most
 
@@ -600,13 +601,15 @@ def length(metres: float) -> str:
     return _with_prefix(metres, "m")
 
 
-def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
+def interval_text(format_size: Callable[[float], str], lower: float, upper: float) -> str:
     """Return an interval as text.
 
-    >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
-    ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
+    >>> interval_text(length, 0.025, 0.025), interval_text(angle, 0.4297, 0.4327)
+    ('25 mm', '429.7 mrad (at most 432.7 mrad)')
+    >>> interval_text(length, 1.0, math.inf)
+    '1 m (without bound)'
     """
-    attained, most = words(lower), words(upper)
+    attained, most = format_size(lower), format_size(upper)
     if attained == most:
         return attained
     return f"{attained} ({most})" if math.isinf(upper) else f"{attained} (at most {most})"
@@ -647,13 +650,13 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 
 
 def changes_of_b(
-    alignment: Alignment, rounding: Tolerance, *, tables: bool = False
+    alignment: Alignment, rounding: Tolerance, *, has_table: bool = False
 ) -> tuple[tuple[str, str], ...]:
     """Return the changes that bring B closest to A.
 
-    The function stores the tool poses in `alignment`. With `tables` (A or B is a Denavit-Hartenberg table),
-    every displaced frame is reported as a tool. The frames of a Denavit-Hartenberg table depend on the
-    table's convention.
+    The function stores the tool poses in `alignment`. With `has_table` (A or B is a Denavit-Hartenberg
+    table), every displaced frame is reported as a tool. The frames of a Denavit-Hartenberg table depend on
+    the table's convention.
 
     Returns:
         (kind, text) of each change.
@@ -689,16 +692,16 @@ def changes_of_b(
             words = f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}"
             lines += [("zeros", words)] if step.offset else []
             lines += [("senses", words)] if step.sense < 0 else []
-    return (*lines, *_tool_changes(alignment, rounding, tables=tables))
+    return (*lines, *_tool_changes(alignment, rounding, has_table=has_table))
 
 
-def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
+def _tool_changes(alignment: Alignment, rounding: Tolerance, *, has_table: bool) -> Iterator[tuple[str, str]]:
+    supports, links = _support_link_pairs(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
-        is_mount = (frame.a, frame.b) in mounts
-        if frame.differs and (is_mount or tables or _is_tool(alignment, frame)):
+        is_support = (frame.a, frame.b) in supports
+        if frame.differs and (is_support or has_table or _are_fixed_end_links(alignment, frame)):
             alignment.frames[k] = frame.move_difference_to_tool()
-            if is_mount and rounding.holds(
+            if is_support and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
                 continue  # The line about the base pose already describes this difference.
@@ -710,23 +713,23 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             )
 
 
-def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
+def _support_link_pairs(alignment: Alignment) -> set[tuple[int, int]]:
     """Return the index pairs of matching links that support the robots, for example pedestals.
 
     Matching links beside the robots are included if their poses are equal.
     """
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
-    (before_a, beside_a), (before_b, beside_b) = (
-        _links_without_joints(m) for m in (alignment.a, alignment.b)
+    (support_a, side_a), (support_b, side_b) = (
+        _support_and_side_links(m) for m in (alignment.a, alignment.b)
     )
     rounding = tolerance_of(alignment.a, alignment.b)
     return {
         (frame.a, frame.b)
         for frame in alignment.frames
-        if (frame.a in before_a and frame.b in before_b)
+        if (frame.a in support_a and frame.b in support_b)
         or (
-            (frame.a in before_a | beside_a and frame.b in before_b | beside_b)
+            (frame.a in support_a | side_a and frame.b in support_b | side_b)
             and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             )
@@ -734,7 +737,7 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
     }
 
 
-def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
+def _support_and_side_links(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     """Find links that support the robot, and links beside the robot.
 
     Returns:
@@ -750,8 +753,8 @@ def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
         if not moves:
             children[joint.parent].append(i + 1)
     body = mechanism.bodies[0] if carried[0] else []
-    before = {link for link in body if any(carried[child] == carried[0] for child in children[link])}
-    return before, {link for link in body if not carried[link]}
+    support = {link for link in body if any(carried[child] == carried[0] for child in children[link])}
+    return support, {link for link in body if not carried[link]}
 
 
 def _conversion_words(
@@ -779,11 +782,11 @@ def _remove_rounding(x: float, rounding: float) -> float:
     return round(x, math.ceil(-math.log10(rounding))) + 0.0
 
 
-def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
+def _are_fixed_end_links(alignment: Alignment, frame: FramePair) -> bool:
     # `same` may treat a mimic joint as a fixed joint, if the multiplier is 0.
     # The child link of this fixed joint is not treated as a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
-        if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):
+        if link == 0 or tree.joints[link - 1].kind.nv or idle_joint_lock(tree.joints[link - 1]):
             return False
         if any(joint.parent == link for joint in tree.joints):
             return False
@@ -801,38 +804,38 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
             len(alignment.path(frame.previous)) + 0.5,
             [
                 Difference(
-                    f"link {tree_a.links[frame.a]}", "place", None, None, *_beyond_rounding(frame, tolerance)
+                    f"link {tree_a.links[frame.a]}", "place", None, None, *_tilt_and_shift(frame, tolerance)
                 )
             ],
         )
         for frame in alignment.frames
         if frame.differs
     ]
-    ordered = [one for _, some in sorted(with_depth, key=lambda pair: pair[0]) for one in some]
+    ordered = [one for _, found in sorted(with_depth, key=lambda pair: pair[0]) for one in found]
     for tree, joints, which in ((tree_a, alignment.only_a, "A"), (tree_b, alignment.only_b, "B")):
-        alone = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
-        ordered += [Difference(place, f"only in {which}") for place in alone]
-    have = {frame.a for frame in alignment.frames}
+        unmatched = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
+        ordered += [Difference(place, f"only in {which}") for place in unmatched]
+    matched = {frame.a for frame in alignment.frames}
     links_of_b = {label: link for link, label in enumerate(alignment.b.labels)}
     for link, label in enumerate(alignment.a.labels):
         other = links_of_b.get(label)
-        if other is not None and link not in have and _is_on_matched_bodies(alignment, link, other):
-            ours, theirs = _carrier(tree_a, link), _carrier(tree_b, other)
+        if other is not None and link not in matched and _is_on_matched_bodies(alignment, link, other):
+            ours, theirs = _carrier_name(tree_a, link), _carrier_name(tree_b, other)
             ordered.append(Difference(f"link {tree_a.links[link]}", "carried by", ours, theirs))
     return tuple(ordered)
 
 
-def _is_on_matched_bodies(alignment: Alignment, link: int, other: int) -> bool:
+def _is_on_matched_bodies(alignment: Alignment, link_a: int, link_b: int) -> bool:
     return all(
         mechanism.body_of[index] not in {mechanism.body_of[j + 1] for j in only}
         for mechanism, only, index in (
-            (alignment.a, alignment.only_a, link),
-            (alignment.b, alignment.only_b, other),
+            (alignment.a, alignment.only_a, link_a),
+            (alignment.b, alignment.only_b, link_b),
         )
     )
 
 
-def _carrier(tree: KinematicTree, link: int) -> str:
+def _carrier_name(tree: KinematicTree, link: int) -> str:
     path = [tree.joints[i] for i in tree.path(link) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
@@ -847,55 +850,58 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
     if step.kind_difference:
         ends = ("fixed", "moves") if step.kind_difference == "a" else ("moves", "fixed")
         return [Difference(place, "fixed", *ends)]
-    some = []
+    found = []
     if step.differs and step.kind in ("planar", "floating"):
-        some.append(Difference(place, "frame", radians=step.tilt, metres=step.shift))
+        found.append(Difference(place, "frame", radians=step.tilt, metres=step.shift))
     elif step.differs:
         detail = "alone" if step.axis_b is not step.axis_a else ""
-        some.append(Difference(place, "axis", None, None, *_beyond_rounding(step, tolerance), detail))
+        found.append(Difference(place, "axis", None, None, *_tilt_and_shift(step, tolerance), detail))
     if i in variables.rule_differences:
-        some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
-    return some
+        found.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
+    return found
 
 
-def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
+def _tilt_and_shift(pair: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
     """Return tilt and shift beyond rounding.
 
     Returns:
         Tilt (rad) and shift (m), each 0 if it is at most the tolerance in `rounding`.
     """
-    return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
+    return (
+        pair.tilt if pair.tilt > rounding.angle else 0.0,
+        pair.shift if pair.shift > rounding.distance else 0.0,
+    )
 
 
 def remarks(
     alignment: Alignment,
     variables: Variables,
     tolerance: Tolerance,
-    single: float = 0.0,
+    single_roundoff: float = 0.0,
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
     """Return differences without effect on motion.
 
-    `single` is the relative rounding error of single precision; 0 for double precision.
+    `single_roundoff` is the relative rounding error of single precision; 0 for double precision.
     """
-    some = list[Difference]()
+    found = list[Difference]()
     for step in alignment.steps:
         if not step.kind_difference:
             a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
             zero = (1, 0.0) if as_written else (step.sense, step.offset)
-            some += limit_differences(a, b, tolerance.angle, single, zero)
+            found += limit_differences(a, b, tolerance.angle, single_roundoff, zero)
     for tree, which in ((alignment.a.tree, "A"), (alignment.b.tree, "B")):
-        for lock in filter(None, map(is_idle, tree.joints)):
+        for lock in filter(None, map(idle_joint_lock, tree.joints)):
             value = lock.joint.kind.value, lock.value
-            some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
+            found.append(Difference(f"joint {lock.joint.name}", "idle", *_value_pair(which, value)))
     # A mimic joint of A can be an independent joint in B with the same motion.
     # For example, the mimic rule in B can be the inverse of the mimic rule in A.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
         line = variables.coordinates_b.get(b.name)
         if a.mimic is not None and line is not None and line.variable == f"a:{a.mimic.mimicked_joint}":
-            some.append(Difference(f"joint {a.name}", "independent joint", a.mimic))
+            found.append(Difference(f"joint {a.name}", "independent joint", a.mimic))
     for tree, other, which in (
         (alignment.a.tree, alignment.b.tree, "A"),
         (alignment.b.tree, alignment.a.tree, "B"),
@@ -903,21 +909,21 @@ def remarks(
         matched = {tree.links[frame.a if which == "A" else frame.b] for frame in alignment.frames}
         alone = tuple(link for link in tree.links if link not in other.links and link not in matched)
         if alone:
-            some.append(Difference(f"links of {which}", f"only in {which}", *_in_order(which, alone)))
-    return tuple(some)
+            found.append(Difference(f"links of {which}", f"only in {which}", *_value_pair(which, alone)))
+    return tuple(found)
 
 
-def _in_order(which: str, value: Value) -> tuple[Value, Value]:
+def _value_pair(which: str, value: Value) -> tuple[Value, Value]:
     return (value, None) if which == "A" else (None, value)
 
 
-def is_idle(joint: Joint) -> Lock | None:
+def idle_joint_lock(joint: Joint) -> Lock | None:
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
 
 def limit_differences(
-    a: Joint, b: Joint, tolerance: float, single: float, zero: tuple[int, float] = (1, 0.0)
+    a: Joint, b: Joint, tolerance: float, single_roundoff: float, zero: tuple[int, float] = (1, 0.0)
 ) -> Iterator[Difference]:
     """Yield differences of kinds and limits.
 
@@ -925,7 +931,7 @@ def limit_differences(
         a: The joint of A.
         b: The joint of B.
         tolerance: Relative tolerance; absolute if both values are below 1.
-        single: Relative rounding error of single precision; 0 for double precision.
+        single_roundoff: Relative rounding error of single precision; 0 for double precision.
         zero: (sign, offset); value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
@@ -933,17 +939,19 @@ def limit_differences(
         yield Difference(place, "kind", a.kind.value, b.kind.value)
     back = sorted(sense * (end - offset) for end in joint_limits(b))
     ours = joint_limits(a)
-    if not all(_close(x, y, tolerance, single) for x, y in zip(ours, back, strict=True)):
+    if not all(_is_close(x, y, tolerance, single_roundoff) for x, y in zip(ours, back, strict=True)):
         detail = "converted" if sense < 0 or offset else ""
         yield Difference(place, "limits", tuple(map(_finite, ours)), tuple(map(_finite, back)), detail=detail)
     for what in ("velocity", "effort"):
         x, y = (getattr(joint.limit, what, math.inf) for joint in (a, b))
-        if not _close(x, y, tolerance, single):
+        if not _is_close(x, y, tolerance, single_roundoff):
             yield Difference(place, what, _finite(x), _finite(y))
 
 
-def _close(x: float, y: float, share: float, single: float) -> bool:
-    return x == y or abs(x - y) <= share * max(1.0, abs(x), abs(y)) + single * max(abs(x), abs(y))
+def _is_close(x: float, y: float, tolerance: float, single_roundoff: float) -> bool:
+    return x == y or abs(x - y) <= tolerance * max(1.0, abs(x), abs(y)) + single_roundoff * max(
+        abs(x), abs(y)
+    )
 
 
 def _finite(x: float) -> float | None:

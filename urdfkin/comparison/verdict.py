@@ -12,7 +12,7 @@ import numpy as np
 
 from urdfkin.comparison.bounds import MAX_BOXES, DistanceSearch, pinocchio_poses, tighten
 from urdfkin.comparison.result import (
-    BOUNDED_DIFFERENCES,
+    BOUNDED_DIFFERENCE_KINDS,
     EQUIVALENCE_KINDS,
     Confirmation,
     Interval,
@@ -63,9 +63,9 @@ from urdfkin.verify.verifier import as_verify
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
 #: The search for the largest distance between the unchanged models uses at most this number of frames.
-MAX_FARTHEST_FRAMES = 4
+MAX_REFINED_FRAMES = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
-MAX_PATH_LENGTH = 1e150
+MAX_PATH_METRES = 1e150
 #: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
 SHARP_FACTOR = 1.05
 
@@ -162,8 +162,8 @@ class Comparator:
         swapped = labels[1], labels[0]
         names = {**self.spellings, **joint_map}
         trees = (
-            _fix_idle_joints(a, b, names, labels),
-            _fix_idle_joints(b, a, _swap_pairs(names), swapped),
+            _fix_idle_mimic_joints(a, b, names, labels),
+            _fix_idle_mimic_joints(b, a, _swap_pairs(names), swapped),
         )
         self.mechanisms = (
             Mechanism(trees[0], _joints_fixed_in_one(*trees, self.spellings, labels), labels[0]),
@@ -172,9 +172,9 @@ class Comparator:
             ),
         )
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
-            if not mechanism.size <= MAX_PATH_LENGTH:
+            if not mechanism.size <= MAX_PATH_METRES:
                 raise InputError(
-                    f"a path from the root to a link is longer than {MAX_PATH_LENGTH:g} m:"
+                    f"a path from the root to a link is longer than {MAX_PATH_METRES:g} m:"
                     " its square overflows",
                     where=f"model {which}, {robot.name}",
                     found=f"{mechanism.size:.6g} m",
@@ -214,7 +214,7 @@ class Comparator:
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
-        changes = changes_of_b(alignment, self.tolerance, tables=self.has_table)
+        changes = changes_of_b(alignment, self.tolerance, has_table=self.has_table)
         kinds = {kind for kind, _ in changes}
         different = differences(alignment, variables)
         single = self._single_precision_bound(alignment, variables)
@@ -222,7 +222,9 @@ class Comparator:
         unexplained = () if verdict is Verdict.SAME else self._unexplained_differences(alignment)
         if single is not None and verdict is not Verdict.SAME and not unexplained:
             verdict = (
-                Verdict.UP_TO_SINGLE if {one.what for one in different} <= BOUNDED_DIFFERENCES else verdict
+                Verdict.UP_TO_SINGLE
+                if {one.what for one in different} <= BOUNDED_DIFFERENCE_KINDS
+                else verdict
             )
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
@@ -374,7 +376,7 @@ class Comparator:
     def _intervals(self, alignment: Alignment, variables: Variables) -> tuple[Interval, ...]:
         frames = alignment.frames
         metres, radians = self.rounding(alignment, variables)
-        uppers = self._upper_bounds(alignment, variables)
+        uppers = self._frame_upper_bounds(alignment, variables)
         different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         search = self.search(alignment, variables)
         largest = search.largest_distances([frames[k] for k in different])
@@ -401,19 +403,19 @@ class Comparator:
         if search.unbounded:
             return math.inf, math.inf
         metres, radians = self.rounding(written, variables)
-        uppers = self._upper_bounds(written, variables)
+        uppers = self._frame_upper_bounds(written, variables)
         target = 0.0 if self.within is None else self.within - metres
         if farthest is not None and farthest.lower <= target:
             self._sharpen(uppers, written.frames, search, target)
         largest = _largest(uppers)
         return largest[0] + metres, largest[1] + radians
 
-    def _upper_bounds(self, alignment: Alignment, variables: Variables) -> list[tuple[float, float]]:
+    def _frame_upper_bounds(self, alignment: Alignment, variables: Variables) -> list[tuple[float, float]]:
         frames = alignment.frames
         uppers = [upper_bounds(alignment, variables, frame) for frame in frames]
         different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         fine = set[int]()
-        while len(fine) < min(MAX_FARTHEST_FRAMES, len(different)):
+        while len(fine) < min(MAX_REFINED_FRAMES, len(different)):
             widest = max(different, key=lambda k: uppers[k])
             if widest in fine:
                 break
@@ -444,7 +446,7 @@ class Comparator:
         metres, radians = self.rounding(written, variables)
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
-        far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
+        far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_REFINED_FRAMES]]
         # If all sampled distances are within rounding, the search uses only one frame.
         # This frame has the largest upper bound on the angle.
         if distances.max() <= metres:
@@ -474,7 +476,7 @@ class Comparator:
         metres, z = attained
         rounding = self.rounding(alignment, search.variables)
         if metres <= rounding[0] and upper[1] > rounding[1]:
-            z = search.largest_rotation(frame)
+            z = search.values_of_largest_rotation(frame)
         poses = search.poses(z[np.newaxis], [frame])
         radians = pose_difference(poses[0][0, 0], poses[1][0, 0])[0]
         q_a, q_b = search.configurations(z[np.newaxis])
@@ -536,19 +538,21 @@ def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tup
 
 def _joints_fixed_in_one(
     tree: KinematicTree,
-    other: KinematicTree,
+    other_tree: KinematicTree,
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return the indices of the fixed joints of `tree` that move in `other`.
+    """Return the indices of the fixed joints of `tree` that move in `other_tree`.
 
     Joints match by their names or by their child links. `names` maps joint names of `tree` to names of
-    `other`.
+    `other_tree`.
     """
-    moving = {joint.name for joint in other.joints if joint.kind.nv}
+    moving = {joint.name for joint in other_tree.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
     children = {
-        labels[1][i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv and joint.name not in ours
+        labels[1][i + 1]
+        for i, joint in enumerate(other_tree.joints)
+        if joint.kind.nv and joint.name not in ours
     }
     return {
         i
@@ -557,19 +561,19 @@ def _joints_fixed_in_one(
     }
 
 
-def _fix_idle_joints(
+def _fix_idle_mimic_joints(
     tree: KinematicTree,
-    other: KinematicTree,
+    other_tree: KinematicTree,
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
     """Fix mimic joints with multiplier 0 at their offsets, unless the matching joint moves."""
-    moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
-    moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
+    moves = [joint.kind.nv > 0 and not _is_idle_mimic_joint(joint) for joint in other_tree.joints]
+    moving = {joint.name for joint, moved in zip(other_tree.joints, moves, strict=True) if moved}
     children = {labels[1][i + 1] for i, moved in enumerate(moves) if moved}
     joints = tuple(
         Lock(joint, 0.0).make_fixed_joint()
-        if _never_moves(joint)
+        if _is_idle_mimic_joint(joint)
         and not (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
         else joint
         for i, joint in enumerate(tree.joints)
@@ -577,7 +581,7 @@ def _fix_idle_joints(
     return tree if joints == tree.joints else replace(tree, joints=joints)
 
 
-def _never_moves(joint: Joint) -> bool:
+def _is_idle_mimic_joint(joint: Joint) -> bool:
     return joint.mimic is not None and joint.mimic.multiplier == 0.0
 
 
@@ -741,7 +745,7 @@ class JointComparison:
         for link, other in sorted(self.pairs.items()):
             if (link, other) == self.start:
                 continue
-            reference, path = self._reference_link(link)
+            reference, path = self._nearest_common_link(link)
             paths = self._paths(0, reference, link), self._paths(1, self.pairs[reference], other)
             yield from self._path_differences(link, paths)
             compared.update(path)
@@ -751,7 +755,7 @@ class JointComparison:
                 why = "no link after this joint has a matching link in the other model"
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
-    def _reference_link(self, link: int) -> tuple[int, list[int]]:
+    def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
         """Return P, the nearest ancestor that is a common link, and the joints from P to a link.
 
         If no ancestor is a common link, P is A's link in `start`.
@@ -779,8 +783,8 @@ class JointComparison:
     ) -> Iterator[JointDifference]:
         trees = self.trees
         moving = [
-            [[i for i in path if tree.joints[i].kind.nv] for path in both]
-            for tree, both in zip(trees, paths, strict=True)
+            [[i for i in path if tree.joints[i].kind.nv] for path in paths_of_model]
+            for tree, paths_of_model in zip(trees, paths, strict=True)
         ]
         steps = [self.steps.get(i) for i in moving[0][1]]
         name = f"link {trees[0].links[link]}"
@@ -799,7 +803,8 @@ class JointComparison:
             yield from self._free_joint_differences(name, [path for _, path in paths])
             return
         screws, poses, bounds = zip(
-            *(self._screws_and_pose(k, *both) for k, both in enumerate(paths)), strict=True
+            *(self._screws_and_pose(k, *paths_of_model) for k, paths_of_model in enumerate(paths)),
+            strict=True,
         )
         if not paths[0][0] and len(paths[0][1]) == 1:
             name = f"joint {trees[0].joints[link - 1].name}"
@@ -822,7 +827,7 @@ class JointComparison:
                 )
             yield from axis
 
-    def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
+    def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
         """Return the angle and the distance between two axes.
 
         The distance is that of one joint's origin from the other joint's axis. For a prismatic joint, the
@@ -831,7 +836,7 @@ class JointComparison:
         Returns:
             Angle, rad, and distance, m.
         """
-        ends = (axis, other) if self.errors[0].any() else (other, axis)
+        ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
     def _screws_and_pose(
@@ -855,15 +860,15 @@ class JointComparison:
         T, errors, T_P_common = np.eye(4), np.zeros(2), inverse(T_common_P)
         screws: dict[int, tuple[Screw, FloatArray]] = {}
 
-        def errors_in_P() -> FloatArray:
+        def errors_relative_to_P() -> FloatArray:
             lever = float(np.linalg.norm((T_P_common @ T)[:3, 3])) if back else 0.0
             return np.asarray(errors + P_errors + np.array([P_errors[1] * lever, 0.0]))
 
         for i in path:
             errors, T = self._errors_after(which, i, errors), T @ joints[i].T_parent_joint
             T_P_joint = T_P_common @ T
-            screws[i] = Screw(T_P_joint[:3, :3] @ joints[i].axis, T_P_joint[:3, 3]), errors_in_P()
-        return screws, T_P_common @ T, errors_in_P()
+            screws[i] = Screw(T_P_joint[:3, :3] @ joints[i].axis, T_P_joint[:3, 3]), errors_relative_to_P()
+        return screws, T_P_common @ T, errors_relative_to_P()
 
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
         """Return (W + E |p_i| + w_i, E + e_i) in m and rad; `errors` is (W, E)."""
@@ -890,11 +895,11 @@ class JointComparison:
             why = "urdfkin cannot compare the planar or floating joint that carries this link"
             yield JointDifference(name, "", None, why)
             return
-        for T, other in (
+        for T_a, T_b in (
             [mechanism.zero_poses[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
             [mechanism.zero_poses[path[0] + 1] for mechanism, path in ends],
         ):
-            if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
+            if not self.tolerance.holds(*pose_difference(T_a, self.base @ T_b)):
                 why = "the planar or floating joint that carries this link has different frames in A and B"
                 yield JointDifference(name, "", None, why)
 
@@ -905,13 +910,13 @@ class JointComparison:
             return
         if a is None or b is None or self.alignment.names.get(a.mimicked_joint) != b.mimicked_joint:
             yield JointDifference(
-                place, "mimic joint", *(one.mimicked_joint if one else "none" for one in (a, b))
+                place, "mimic joint", *(rule.mimicked_joint if rule else "none" for rule in (a, b))
             )
             return
-        share = float(self.errors[0][step.a, 2] + self.errors[1][step.b, 2])
+        relative_error = float(self.errors[0][step.a, 2] + self.errors[1][step.b, 2])
         for what in ("multiplier", "offset"):
             x, y = getattr(a, what), getattr(b, what)
             size = max(abs(x), abs(y))
-            if abs(x - y) > share * size + self.tolerance.angle * max(1.0, size):
-                explained = f"{share * size:.2g}" if share else ""
+            if abs(x - y) > relative_error * size + self.tolerance.angle * max(1.0, size):
+                explained = f"{relative_error * size:.2g}" if relative_error else ""
                 yield JointDifference(place, f"mimic {what}", x, y, explained)

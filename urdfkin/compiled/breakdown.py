@@ -48,7 +48,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Kinds of acceleration that a joint contributes, in the order of `AccelerationBreakdown.terms`.
 ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
-_MAX_DISPLAYED = 2
+_MAX_DISPLAYED_SAMPLES = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,11 +83,11 @@ class AccelerationBreakdown(Displayable):
         heads = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
         batch = self.base.shape[:-1]
         parts: list[str | Table] = ["m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130)."]
-        for sample in list(np.ndindex(*batch))[:_MAX_DISPLAYED]:
+        for sample in list(np.ndindex(*batch))[:_MAX_DISPLAYED_SAMPLES]:
             parts += [f"sample {list(sample)}"] if sample else []
             rows = [(joint, kind, *six.tolist()) for joint, kind, six in self.contributions(sample)]
             parts.append(Table(heads, [*rows, ("sum", "", *self.total[sample].tolist())], left=2))
-        if (more := math.prod(batch) - _MAX_DISPLAYED) > 0:
+        if (more := math.prod(batch) - _MAX_DISPLAYED_SAMPLES) > 0:
             parts.append(f"... and {more} more samples")
         return TextDocument("Acceleration by joint and kind", parts)
 

@@ -42,7 +42,7 @@ from urdfkin.compiled.plan import (
     compile_program,
     make_scratch,
 )
-from urdfkin.compiled.python_numbers import LARGE
+from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.validators import as_int
 from urdfkin.model.base_motion import FIXED_BASE_STATE, subtract_gravity
@@ -56,7 +56,7 @@ _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results.
 #: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
-_MAX_BUFFER_SIZE = 3072
+_MAX_BUFFER_DOUBLES = 3072
 
 _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
 
@@ -168,7 +168,7 @@ def _compute(
         invalid = _compute_compiled(
             name, program, reference, inputs, out, threads, buffered=uses_buffer(out) and not keep_in_cache
         )
-    if invalid or plan.is_large or _is_large(base):
+    if invalid or plan.may_overflow or _base_may_overflow(base):
         _check_finite(inputs, out)
     return out
 
@@ -192,16 +192,16 @@ def _compute_interpreted(
         return None
     if threads is not None:
         as_int(threads, "threads", 1)
-    recursion, least, invalid = getattr(recursions, name), math.inf, 0
+    recursion, least_seconds, invalid = getattr(recursions, name), math.inf, 0
     flat = out.reshape(len(out), math.prod(out.shape[1:]))
     for i, row in enumerate(flat):
-        begin, result = time.thread_time(), [0.0] * len(row)
+        start_time, result = time.thread_time(), [0.0] * len(row)
         invalid |= recursion(_list_args(program, reference, inputs, i, result))
         row[:] = result
-        least = min(least, took := time.thread_time() - begin)
-        preload.add_time(name, took)
+        least_seconds = min(least_seconds, seconds := time.thread_time() - start_time)
+        preload.add_time(name, seconds)
         # The first configuration takes longer than later configurations, so its time is not representative.
-        if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least) is not None:
+        if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least_seconds) is not None:
             return None
     return invalid
 
@@ -239,11 +239,11 @@ def _compute_compiled(
         del alive
         return outcome
 
-    return compute_in_blocks(compute, inputs, out, threads)
+    return compute_in_threads(compute, inputs, out, threads)
 
 
 def uses_buffer(out: FloatArray) -> bool:
-    return out.nbytes >= _MIN_BUFFERED_BYTES and LANES * out[0].size <= _MAX_BUFFER_SIZE
+    return out.nbytes >= _MIN_BUFFERED_BYTES and LANES * out[0].size <= _MAX_BUFFER_DOUBLES
 
 
 def make_kernel_args(
@@ -272,8 +272,8 @@ def make_kernel_args(
     return args, (memory, buffer)
 
 
-def _is_large(base: FloatArray) -> bool:
-    return base is not FIXED_BASE_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
+def _base_may_overflow(base: FloatArray) -> bool:
+    return base is not FIXED_BASE_STATE and not float(np.abs(base).max(initial=0.0)) < NO_OVERFLOW_BOUND
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
@@ -311,7 +311,7 @@ def _processors() -> int:
     return os.cpu_count() or 1  # macOS has no `sched_getaffinity`.
 
 
-def compute_in_blocks(
+def compute_in_threads(
     compute: BlockFunction, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
 ) -> int:
     """Compute `out` in several threads.

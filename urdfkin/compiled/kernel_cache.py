@@ -60,11 +60,11 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
     """
     starts: list[float] = []
 
-    def begin() -> None:
+    def report_start() -> None:
         starts.append(time.perf_counter())
         _listeners[-1](name, None)
 
-    yield begin
+    yield report_start
     if starts:
         _listeners[-1](name, time.perf_counter() - starts[0])
 

@@ -1,7 +1,8 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-The state of a link consists of vectors. A function `mask_...` marks the vectors that an output does not need.
-Jacobian columns are computed in world axes. For LOCAL, the columns are rotated to the axes of the frame.
+The state of a link consists of vectors. A function `state_for_...` marks the vectors that an output does not
+need. Jacobian columns are computed in world axes. For LOCAL, the columns are rotated to the axes of the
+frame.
 """
 
 from __future__ import annotations
@@ -37,15 +38,15 @@ def _unused_vector():
     return unused(), unused(), unused()
 
 
-def mask_for_placement(state):
+def state_for_placement(state):
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
-def mask_for_velocity(state):
+def state_for_velocity(state):
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
-def mask_for_acceleration(state):
+def state_for_acceleration(state):
     """Mark the linear velocity as unused: the acceleration (7.130) does not need it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
@@ -57,115 +58,115 @@ def _zero_vector():
 # -- the result of one frame -----------------------------------------------------------------------------
 
 
-def write_placement(m, s, program, place, sources, b, reference, state, to):
+def write_placement(m, scratch, program, frame, sources, start, reference, state, to):
     R, p = state[0], state[1]
-    _store_pose_row(s, OUT_ROW, R[0], p[0])
-    _store_pose_row(s, OUT_ROW + 4, R[1], p[1])
-    _store_pose_row(s, OUT_ROW + 8, R[2], p[2])
+    _store_pose_row(scratch, OUT_ROW, R[0], p[0])
+    _store_pose_row(scratch, OUT_ROW + 4, R[1], p[1])
+    _store_pose_row(scratch, OUT_ROW + 8, R[2], p[2])
     frames = program[_FRAMES]
-    write_rows(m, s, array_data(_POSE_ROWS), 0, 16, to, (b * frames + place) * 16, frames * 16)
+    write_rows(m, scratch, array_data(_POSE_ROWS), 0, 16, to, (start * frames + frame) * 16, frames * 16)
 
 
-def _store_pose_row(s, row, x, last):
-    store_vector(s, row, x)
-    store_number(s, row + 3, last)
+def _store_pose_row(scratch, row, x, last):
+    store_vector(scratch, row, x)
+    store_number(scratch, row + 3, last)
 
 
-def write_velocity(m, s, program, place, sources, b, reference, state, to):
+def write_velocity(m, scratch, program, frame, sources, start, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
     if reference == _WORLD:
         # The result is the velocity of the body point that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
-    _write_six_vector(m, s, program, place, b, vel, w, to)
+    _write_six_vector(m, scratch, program, frame, start, vel, w, to)
 
 
-def write_acceleration(m, s, program, place, sources, b, reference, state, to):
+def write_acceleration(m, scratch, program, frame, sources, start, reference, state, to):
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
     if reference == _WORLD:
         acc = eq.point_acceleration(acc, alpha, w, eq.minus(_zero_vector(), p))
-    _write_six_vector(m, s, program, place, b, acc, alpha, to)
+    _write_six_vector(m, scratch, program, frame, start, acc, alpha, to)
 
 
-def write_imu(m, s, program, place, sources, b, reference, state, to):
+def write_imu(m, scratch, program, frame, sources, start, reference, state, to):
     """Write accelerometer and gyroscope readings.
 
     The caller must subtract gravity from the base's acceleration.
     """
-    _write_six_vector(m, s, program, place, b, state[5], state[2], to)
+    _write_six_vector(m, scratch, program, frame, start, state[5], state[2], to)
 
 
-def _write_six_vector(m, s, program, place, b, linear, angular, to):
-    store_vector(s, OUT_ROW, linear)
-    store_vector(s, OUT_ROW + 3, angular)
+def _write_six_vector(m, scratch, program, frame, start, linear, angular, to):
+    store_vector(scratch, OUT_ROW, linear)
+    store_vector(scratch, OUT_ROW + 3, angular)
     frames = program[_FRAMES]
-    write_rows(m, s, array_data(_SIX_ROWS), 0, 6, to, (b * frames + place) * 6, frames * 6)
+    write_rows(m, scratch, array_data(_SIX_ROWS), 0, 6, to, (start * frames + frame) * 6, frames * 6)
 
 
-def write_matrix(m, s, program, place, sources, b, reference, state, to):
+def write_matrix(m, scratch, program, frame, sources, start, reference, state, to):
     frames, size = program[_FRAMES], 6 * program[_NV]
-    write_rows(m, s, program, sources, size, to, (b * frames + place) * size, frames * size)
+    write_rows(m, scratch, program, sources, size, to, (start * frames + frame) * size, frames * size)
 
 
 # -- columns ---------------------------------------------------------------------------------------------
 
 
-def store_no_axis(s, row, axis, state):
+def store_no_axis(scratch, row, axis, state):
     """Do nothing: this output has no Jacobian columns."""
 
 
-def write_no_column(s, row, to, flags, g, c, reference, state): ...
+def write_no_column(scratch, row, to, flags, constants, multiplier_index, reference, state): ...
 
 
-def store_axis(s, row, axis, state):
+def store_axis(scratch, row, axis, state):
     """Store a joint's axis and origin in world axes (7.85)."""
     R, p = state[0], state[1]
     if axis == 2:
-        store_vector(s, row, (R[0][2], R[1][2], R[2][2]))
+        store_vector(scratch, row, (R[0][2], R[1][2], R[2][2]))
     elif axis == 1:
-        store_vector(s, row, (R[0][1], R[1][1], R[2][1]))
+        store_vector(scratch, row, (R[0][1], R[1][1], R[2][1]))
     else:
-        store_vector(s, row, (R[0][0], R[1][0], R[2][0]))
-    store_vector(s, row + 3, p)
+        store_vector(scratch, row, (R[0][0], R[1][0], R[2][0]))
+    store_vector(scratch, row + 3, p)
 
 
-def store_moving_axis(s, row, axis, state):
-    store_axis(s, row, axis, state)
-    store_vector(s, row + 6, state[2])
-    store_vector(s, row + 9, state[3])
+def store_moving_axis(scratch, row, axis, state):
+    store_axis(scratch, row, axis, state)
+    store_vector(scratch, row + 6, state[2])
+    store_vector(scratch, row + 9, state[3])
 
 
-def write_jacobian_column(s, row, to, flags, g, c, reference, state):
+def write_jacobian_column(scratch, row, to, flags, constants, multiplier_index, reference, state):
     """Compute a Jacobian column (7.85)."""
-    z, R = load_vector(s, row), state[0]
+    z, R = load_vector(scratch, row), state[0]
     if flags & 1:
-        d = eq.minus(_reference_point(reference, state[1]), load_vector(s, row + 3))
+        d = eq.minus(_reference_point(reference, state[1]), load_vector(scratch, row + 3))
         linear, angular = eq.turning_column(z, d)
-        _write_column(s, to, flags, g, c, reference, R, linear, angular)
+        _write_column(scratch, to, flags, constants, multiplier_index, reference, R, linear, angular)
     else:
-        _write_column(s, to, flags, g, c, reference, R, z, _zero_vector())
+        _write_column(scratch, to, flags, constants, multiplier_index, reference, R, z, _zero_vector())
 
 
-def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
+def write_jacobian_rate_column(scratch, row, to, flags, constants, multiplier_index, reference, state):
     """Compute the time derivative of a Jacobian column (7.126).
 
     For LOCAL, differentiate the components in the frame's moving axes.
     """
     R, p, w, vel = state[0], state[1], state[2], state[3]
-    z = load_vector(s, row)
-    z_rate = eq.axis_rate(load_vector(s, row + 6), z)
+    z = load_vector(scratch, row)
+    z_rate = eq.axis_rate(load_vector(scratch, row + 6), z)
     if flags & 1:
-        d = eq.minus(_reference_point(reference, p), load_vector(s, row + 3))
-        d_rate = eq.minus(_reference_point(reference, vel), load_vector(s, row + 9))
+        d = eq.minus(_reference_point(reference, p), load_vector(scratch, row + 3))
+        d_rate = eq.minus(_reference_point(reference, vel), load_vector(scratch, row + 9))
         linear, angular = eq.turning_column(z, d)
         rate, turning = eq.turning_column_rate(z, z_rate, d, d_rate)
         if reference == _LOCAL:
             rate = eq.rate_in_turning_axes(rate, w, linear)
             turning = eq.rate_in_turning_axes(turning, w, angular)
-        _write_column(s, to, flags, g, c, reference, R, rate, turning)
+        _write_column(scratch, to, flags, constants, multiplier_index, reference, R, rate, turning)
     else:
         if reference == _LOCAL:
             z_rate = eq.rate_in_turning_axes(z_rate, w, z)
-        _write_column(s, to, flags, g, c, reference, R, z_rate, _zero_vector())
+        _write_column(scratch, to, flags, constants, multiplier_index, reference, R, z_rate, _zero_vector())
 
 
 def _reference_point(reference, x):
@@ -179,51 +180,51 @@ def _reference_point(reference, x):
     return x
 
 
-def _write_column(s, to, flags, g, c, reference, R, linear, angular):
+def _write_column(scratch, to, flags, constants, multiplier_index, reference, R, linear, angular):
     if reference == _LOCAL:
         back = eq.transposed(R)
         linear, angular = eq.rotate(back, linear), eq.rotate(back, angular)
-    if c:
-        linear = eq.times(load_constant(g, c), linear)
-        _add_column(s, to, flags, linear, eq.times(load_constant(g, c), angular))
+    if multiplier_index:
+        linear = eq.times(load_constant(constants, multiplier_index), linear)
+        _add_column(scratch, to, flags, linear, eq.times(load_constant(constants, multiplier_index), angular))
     else:
-        _add_column(s, to, flags, linear, angular)
+        _add_column(scratch, to, flags, linear, angular)
 
 
-def _add_column(s, to, flags, linear, angular):
+def _add_column(scratch, to, flags, linear, angular):
     if flags & 2:
-        _add_six_vector(s, to, linear, angular)
+        _add_six_vector(scratch, to, linear, angular)
     else:
-        store_vector(s, to, linear)
-        store_vector(s, to + 3, angular)
+        store_vector(scratch, to, linear)
+        store_vector(scratch, to + 3, angular)
 
 
-def _add_six_vector(s, to, linear, angular):
-    store_vector(s, to, eq.plus(load_vector(s, to), linear))
-    store_vector(s, to + 3, eq.plus(load_vector(s, to + 3), angular))
+def _add_six_vector(scratch, to, linear, angular):
+    store_vector(scratch, to, eq.plus(load_vector(scratch, to), linear))
+    store_vector(scratch, to + 3, eq.plus(load_vector(scratch, to + 3), angular))
 
 
 # -- pairs of columns ------------------------------------------------------------------------------------
 
 
-def write_hessian(m, s, program, place, pairs, b, reference, state, to):
-    count, nv = program[pairs], program[_NV]
-    first, end = pairs + 1, pairs + 1 + HESSIAN_COLUMN_WIDTH * count
+def write_hessian(m, scratch, program, frame, sources, start, reference, state, to):
+    count, nv = program[sources], program[_NV]
+    first, end = sources + 1, sources + 1 + HESSIAN_COLUMN_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
-    begin = (b * frames + place) * 6 * size
+    begin = (start * frames + frame) * 6 * size
     for rate in range(nv):
         for j in range(first, end, HESSIAN_COLUMN_WIDTH):
-            store_vector(s, program[j + 3], _zero_vector())
-            store_vector(s, program[j + 3] + 3, _zero_vector())
+            store_vector(scratch, program[j + 3], _zero_vector())
+            store_vector(scratch, program[j + 3] + 3, _zero_vector())
         for i in range(first, end, HESSIAN_COLUMN_WIDTH):
             if program[i + 2] == rate:  # Mimic joints have the velocity index of the mimicked joint.
-                _add_column_derivatives(s, program, i, first, end, reference)
+                _add_column_derivatives(scratch, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
-            write_rows(m, s, program, end + row * nv, nv, to, at, frames * 6 * size)
+            write_rows(m, scratch, program, end + row * nv, nv, to, at, frames * 6 * size)
 
 
-def _add_column_derivatives(s, program, i, first, end, reference):
+def _add_column_derivatives(scratch, program, i, first, end, reference):
     """Add the derivatives of column i with respect to each joint's motion.
 
     The joint of column i counts as an earlier joint.
@@ -234,19 +235,23 @@ def _add_column_derivatives(s, program, i, first, end, reference):
     | WORLD | column i moves, the world's origin does not | no change |
     | LOCAL | no change: column i and the frame move as one rigid body | the frame moves |
     """
-    v_i, w_i = load_vector(s, program[i]), load_vector(s, program[i] + 3)
+    v_i, w_i = load_vector(scratch, program[i]), load_vector(scratch, program[i] + 3)
     for j in range(first, end, HESSIAN_COLUMN_WIDTH):
-        v_j, w_j, sum_j = load_vector(s, program[j]), load_vector(s, program[j] + 3), program[j + 3]
+        v_j, w_j, sum_j = (
+            load_vector(scratch, program[j]),
+            load_vector(scratch, program[j] + 3),
+            program[j + 3],
+        )
         before = program[j + 1] <= program[i + 1]
         if reference == _ALIGNED:
             if before:
-                linear, angular = eq.turned_along(w_j, v_i, w_i)
-                _add_six_vector(s, sum_j, linear, angular)
+                linear, angular = eq.derivative_by_earlier_joint(w_j, v_i, w_i)
+                _add_six_vector(scratch, sum_j, linear, angular)
             else:
-                _add_six_vector(s, sum_j, eq.end_moved(w_i, v_j), _zero_vector())
+                _add_six_vector(scratch, sum_j, eq.derivative_by_later_joint(w_i, v_j), _zero_vector())
         elif reference == _WORLD and before:
             linear, angular = eq.motion_product(v_j, w_j, v_i, w_i)
-            _add_six_vector(s, sum_j, linear, angular)
+            _add_six_vector(scratch, sum_j, linear, angular)
         elif reference == _LOCAL and not before:
             linear, angular = eq.motion_product(v_i, w_i, v_j, w_j)
-            _add_six_vector(s, sum_j, linear, angular)
+            _add_six_vector(scratch, sum_j, linear, angular)

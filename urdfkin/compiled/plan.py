@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.compiled.python_numbers import LARGE, Number
+from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND, Number
 from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, pose
@@ -58,7 +58,7 @@ class ColumnField(IntEnum):
     V = 3
 
 
-_MOTION = {
+_MOTION_OF_KIND = {
     JointKind.REVOLUTE: JointMotion.REVOLUTE,
     JointKind.CONTINUOUS: JointMotion.REVOLUTE,
     JointKind.PRISMATIC: JointMotion.PRISMATIC,
@@ -92,14 +92,14 @@ class CompiledTree:
     | offsets | (frames, 12) | rotation and translation from the last moving joint, in the order of `frames` |
     | columns | (columns, 4) | integers of each Jacobian column; `ColumnField` names the columns |
     | multipliers | (columns,) | multiplier of the joint's mimic rule; 1 without a rule |
-    | sum_columns | (frames, columns) | column to which each column is added; -1: no effect on the frame |
+    | target_columns | (frames, columns) | column to which each column is added; -1: no effect on the frame |
     | q_indices | | indices of the coordinates that the recursion needs |
     | parents | (steps,) | row of the previous moving joint; -1 for none |
     | lengths | (steps + frames,) | path lengths (m) to each moving joint, then to each row of `frames` |
     | depth | (frames,) | number of URDF joints from the root, in output order |
     | tilts | (frames,) | sum of `Joint.pinocchio_tilt` (rad) over these URDF joints, in output order |
 
-    `sum_columns`: joints with the same index in v share the column of the first joint on the path.
+    `target_columns`: joints with the same index in v share the column of the first joint on the path.
     `lengths`: sum of `Joint.length` over the joints after the previous moving joint, fixed joints included.
     Without a previous moving joint, the sum begins at the base.
     """
@@ -113,7 +113,7 @@ class CompiledTree:
     offsets: FloatArray
     columns: IntArray
     multipliers: FloatArray
-    sum_columns: IntArray
+    target_columns: IntArray
     q_indices: tuple[int, ...]
     parents: IntArray
     lengths: FloatArray
@@ -133,9 +133,9 @@ class CompiledTree:
         return {}
 
     @cached_property
-    def is_large(self) -> bool:
+    def may_overflow(self) -> bool:
         numbers = self.geometry, self.offsets, self.lengths
-        return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
+        return any(float(np.abs(x).max(initial=0.0)) >= NO_OVERFLOW_BOUND for x in numbers)
 
     @cached_property
     def all_revolute(self) -> bool:
@@ -161,7 +161,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
     steps, geometry = _steps(tree, needed, anchors)
     parents = [anchors[tree.joints[i].parent].step for i in needed]
     columns, multipliers = _columns(steps, geometry)
-    sum_columns = _find_sum_columns(columns, parents, [anchors[link].step for link in links])
+    target_columns = _find_target_columns(columns, parents, [anchors[link].step for link in links])
     places = zip(steps[:, StepField.Q].tolist(), needed, strict=True)
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
     ends = [anchors[links[place]] for place in order]
@@ -177,7 +177,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
         offsets=np.array([_flatten_pose(end.T) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
-        sum_columns=sum_columns[order],
+        target_columns=target_columns[order],
         q_indices=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
         parents=np.array(parents, dtype=np.int64),
         lengths=np.array(
@@ -246,7 +246,7 @@ def _steps(
     for row, i in enumerate(needed):
         joint = tree.joints[i]
         T_step_joint = anchors[joint.parent].T @ joint.T_parent_joint @ axis_pose(joint)
-        steps[row, StepField.KIND] = _MOTION[joint.kind]
+        steps[row, StepField.KIND] = _MOTION_OF_KIND[joint.kind]
         steps[row, StepField.Q] = tree.q_index[i]
         steps[row, StepField.V] = tree.v_index[i]
         geometry[row, : Geometry.MULTIPLIER] = _flatten_pose(T_step_joint)
@@ -265,8 +265,8 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
     return columns, geometry[columns[:, ColumnField.STEP], Geometry.MULTIPLIER].copy()
 
 
-def _find_sum_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    sum_columns = np.full((len(ends), len(columns)), -1, dtype=np.int64)
+def _find_target_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
+    target_columns = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):
         ancestors, step = set[int](), end
@@ -276,8 +276,8 @@ def _find_sum_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[
         first: dict[int, int] = {}
         for c, column in enumerate(rows):
             if column[ColumnField.STEP] in ancestors:
-                sum_columns[frame, c] = first.setdefault(column[ColumnField.V], c)
-    return sum_columns
+                target_columns[frame, c] = first.setdefault(column[ColumnField.V], c)
+    return target_columns
 
 
 # -- the program -----------------------------------------------------------------------------------------
@@ -361,7 +361,7 @@ STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
 #: 3: first scratch row of six sums of derivatives with respect to the joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
-_JOINTS = {
+_JOINT_OPS = {
     JointMotion.REVOLUTE: Op.REVOLUTE,
     JointMotion.PRISMATIC: Op.PRISMATIC,
     JointMotion.PLANAR: Op.PLANAR,
@@ -425,9 +425,9 @@ class _ProgramWriter:
         self.state_rows = self.sums + COLUMN_ROWS * len(plan.columns) * hessian
         self.rules = [self._add_mimic_rule(i) for i in range(len(plan.steps))]
         parts = (
-            _block_starts(plan.q_indices),
-            _block_starts(plan.columns[:, ColumnField.V].tolist()),
-            self._angle_entries(),
+            _needed_block_starts(plan.q_indices),
+            _needed_block_starts(plan.columns[:, ColumnField.V].tolist()),
+            self._program_angles(),
         )
         self.lists = [number for part in parts for number in part]
         begins = np.cumsum([len(ProgramHeader), *map(len, parts)]).tolist()
@@ -435,15 +435,15 @@ class _ProgramWriter:
         self.head = [0, plan.nq, plan.nv, len(plan.frames), *lists, self.q, self.v, self.a, self.base]
 
     def program(self) -> KernelProgram:
-        self._write()
+        self._write_instructions()
         self._add_instruction(Op.END)
         rows = self.state_rows + STATE_ROWS * len(self.slots)
         self.head[ProgramHeader.CODE] = len(self.head) + len(self.lists)
         words = [*self.head, *self.lists, *(word for line in self.code for word in line)]
         return KernelProgram(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
-    def _write(self) -> None:
-        events = list(self._events())
+    def _write_instructions(self) -> None:
+        events = list(self._joints_and_frames())
         columns = self.plan.columns if self.columns else self.plan.columns[:0]
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
@@ -463,7 +463,7 @@ class _ProgramWriter:
             elif frame is not None and self._add_frame(frame):
                 now = -2  # The registers contain the state of the frame, not of a joint.
 
-    def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
+    def _joints_and_frames(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield joints and frames in the recursion's order.
 
         Yields:
@@ -516,7 +516,7 @@ class _ProgramWriter:
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._add_constants(multiplier, constant)
 
-    def _angle_entries(self) -> list[int]:
+    def _program_angles(self) -> list[int]:
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = JointMotion(step[StepField.KIND]), self.q + int(step[StepField.Q])
@@ -532,7 +532,7 @@ class _ProgramWriter:
     def _add_joint(self, i: int) -> None:
         geometry, step = self.plan.geometry[i], self.plan.steps[i]
         self._add_transform(geometry[:9].reshape(3, 3), geometry[Geometry.OFFSET : Geometry.MULTIPLIER])
-        op, rule, sine = _JOINTS[JointMotion(step[StepField.KIND])], self.rules[i], self.sines + 2 * i
+        op, rule, sine = _JOINT_OPS[JointMotion(step[StepField.KIND])], self.rules[i], self.sines + 2 * i
         first = sine if op is Op.REVOLUTE else self.q + int(step[StepField.Q])
         self._add_instruction(
             op, first, int(step[StepField.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule
@@ -551,7 +551,7 @@ class _ProgramWriter:
         return moved
 
     def _add_columns(self, f: int) -> None:
-        for c, mimicked_joint in enumerate(self.plan.sum_columns[f].tolist()):
+        for c, mimicked_joint in enumerate(self.plan.target_columns[f].tolist()):
             if mimicked_joint >= 0:
                 multiplier = float(self.plan.multipliers[c])
                 multiplier_index = 0 if multiplier == 1.0 else self._add_constants(multiplier)
@@ -564,14 +564,14 @@ class _ProgramWriter:
         """Return the scratch row of each entry of the (6, nv) matrix, in C order."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
-        for c in np.flatnonzero(plan.sum_columns[f] == np.arange(len(plan.columns))):
+        for c in np.flatnonzero(plan.target_columns[f] == np.arange(len(plan.columns))):
             sources[:, plan.columns[c, ColumnField.V]] = row + COLUMN_ROWS * c + np.arange(6)
         return sources.ravel().tolist()
 
     def _hessian_entries(self, f: int) -> list[int]:
-        columns, sum_columns = self.plan.columns, self.plan.sum_columns[f]
-        own = np.flatnonzero(sum_columns >= 0)
-        rows = self.column_rows + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * sum_columns[own]
+        columns, target_columns = self.plan.columns, self.plan.target_columns[f]
+        own = np.flatnonzero(target_columns >= 0)
+        rows = self.column_rows + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * target_columns[own]
         pairs = np.column_stack(
             (rows[0], columns[own, ColumnField.STEP], columns[own, ColumnField.V], rows[1])
         )
@@ -583,7 +583,7 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
     return bool((R[axis] == one).all() and (R[:, axis] == one).all())
 
 
-def _block_starts(indices: Sequence[int]) -> list[int]:
+def _needed_block_starts(indices: Sequence[int]) -> list[int]:
     """Return the starts of the needed blocks of eight: [0, 8] for the indices [3, 5, 12]."""
     return sorted({int(index) // 8 * 8 for index in indices})
 

@@ -38,15 +38,15 @@ LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
 #: Each further kernel is loaded when its plain Python version has taken this time (s).
 _LOAD_NEXT_AFTER = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
-_SECONDS_SAVED = 5e-5
+_SECONDS_SAVED_PER_CALL = 5e-5
 #: Time (s) after which the cache folder is searched again for a missing kernel.
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 #: Two groups of kernels with about equal compile times.
 #: Each of two processes compiles a group.
-_FIRST_GROUP = "accelerations", "local_accelerations", "velocities"
-_SECOND_GROUP = "jacobians", "jacobian_rates", "local_velocities", "placements"
+_FIRST_PROCESS_KERNELS = "accelerations", "local_accelerations", "velocities"
+_SECOND_PROCESS_KERNELS = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
@@ -96,7 +96,7 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
     return load_kernel(name, module)
 
 
-def should_load_single(name: str) -> bool:
+def should_load_single_evaluator(name: str) -> bool:
     """Return whether to load the kernel `one_configuration`.
 
     Each call adds the time that this kernel could have saved.
@@ -105,7 +105,7 @@ def should_load_single(name: str) -> bool:
         return _modes[-1] == "compiled"
     if name not in _kernels and f"local_{name}" not in _kernels:
         return False
-    add_time("one_configuration", _SECONDS_SAVED)
+    add_time("one_configuration", _SECONDS_SAVED_PER_CALL)
     expected_seconds = COMPILE_AFTER if kernel_cache_folder() is None else LOAD_AFTER
     return get_kernel("one_configuration", expected_seconds, SINGLE_MODULE) is not None
 
@@ -133,7 +133,7 @@ def _is_on_disk(name: str) -> bool:
 #: Python code for the second process.
 #: The process ends when its standard input closes.
 #: The standard input closes when the first process ends.
-_EXIT_WITH_PARENT = (
+_EXIT_WITH_PARENT_CODE = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
 )
@@ -163,7 +163,7 @@ def _start_compiler(names: Sequence[str], module: str = KERNELS_MODULE) -> subpr
     from urdfkin.system.processes import python_command
 
     load = f"preload._load_group({tuple(names)!r}, {module!r})"
-    code = f"{_EXIT_WITH_PARENT} from urdfkin.compiled import preload; {load}"
+    code = f"{_EXIT_WITH_PARENT_CODE} from urdfkin.compiled import preload; {load}"
     return subprocess.Popen(
         python_command(code),
         stdin=subprocess.PIPE,
@@ -176,10 +176,10 @@ def _kill_background() -> None:
     for process in _background.values():
         process.kill()
         process.wait()
-        _close(process)
+        _close_stdin(process)
 
 
-def _close(process: subprocess.Popen[bytes]) -> None:
+def _close_stdin(process: subprocess.Popen[bytes]) -> None:
     if process.stdin is not None:
         process.stdin.close()
 
@@ -191,7 +191,7 @@ def _close_inherited_inputs() -> None:
     """
     for process in _background.values():
         process.returncode = 0
-        _close(process)
+        _close_stdin(process)
     _background.clear()
 
 
@@ -203,20 +203,20 @@ os.register_at_fork(after_in_child=_close_inherited_inputs)
 
 
 def all_kernels_on_disk() -> bool:
-    return all(map(_is_on_disk, _FIRST_GROUP + _SECOND_GROUP))
+    return all(map(_is_on_disk, _FIRST_PROCESS_KERNELS + _SECOND_PROCESS_KERNELS))
 
 
 def load_all_kernels() -> None:
     """Load or compile the kernels of both groups before several processes start."""
-    missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_GROUP))
-    compiler = _start_compiler(_SECOND_GROUP) if missing else None
+    missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_PROCESS_KERNELS))
+    compiler = _start_compiler(_SECOND_PROCESS_KERNELS) if missing else None
     try:
-        _load_group(_FIRST_GROUP)
+        _load_group(_FIRST_PROCESS_KERNELS)
     finally:
         if compiler is not None:
             compiler.wait()
-            _close(compiler)
-    _load_group(_SECOND_GROUP)
+            _close_stdin(compiler)
+    _load_group(_SECOND_PROCESS_KERNELS)
 
 
 def _load_group(names: Sequence[str], module: str = KERNELS_MODULE) -> None:

@@ -185,10 +185,10 @@ class PreparedFrame:
         None means that `Robot` must compute the result.
         """
         # Only `Robot` normalises quaternions and checks for overflow.
-        needs_robot = self._robot.tree.floating_joints or self._plan.is_large
+        needs_robot = self._robot.tree.floating_joints or self._plan.may_overflow
         if needs_robot or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None
-        if not self.always_load and not preload.should_load_single(f"{quantity}s"):
+        if not self.always_load and not preload.should_load_single_evaluator(f"{quantity}s"):
             return None
         with compile_lock, import_lock:
             from urdfkin.compiled.machine.single import array_layout_is_known, make_single_evaluator

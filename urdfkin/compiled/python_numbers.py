@@ -11,17 +11,17 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If coordinates, velocities, lengths and multipliers are below this bound, no result overflows.
-#: For N joints, a joint velocity is below LARGE^2, a path length d is below N LARGE^2,
-#: and an angular velocity w is below N LARGE^2.
-#: The largest product w^2 d is therefore below N^3 LARGE^6.
-LARGE = 1e45
+#: If coordinates, velocities, lengths and multipliers are below this bound L, no result overflows.
+#: For N joints, a joint velocity is below L^2, a path length d is below N L^2,
+#: and an angular velocity w is below N L^2.
+#: The largest product w^2 d is therefore below N^3 L^6.
+NO_OVERFLOW_BOUND = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
-_2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
+_TWO_OVER_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
 #: Adding this constant rounds a number between -2^51 and 2^51 to an integer.
 #: The lowest bits of the sum's mantissa are this integer.
-NO_FRACTION = 1.5 * 2.0**52
+ROUNDING_SHIFT = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -47,7 +47,9 @@ def _c_fma() -> Callable[[float, float, float], float]:
     return function
 
 
-def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
+def _fma_without_errors(
+    own: Callable[..., float], c: Callable[..., float]
+) -> Callable[[float, float, float], float]:
     """Return a fused multiply-add that gives inf or nan instead of an error."""
 
     def fma(x: float, y: float, z: float) -> float:
@@ -59,7 +61,7 @@ def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[
     return fma
 
 
-fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
+fma = _fma_without_errors(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
 
 
 class Number:
@@ -208,21 +210,21 @@ def round_product(x: Any) -> Any:
 # -- memory ----------------------------------------------------------------------------------------------
 
 
-def load_number(s: Sequence[Number], row: int) -> Number:
-    return s[row]
+def load_number(scratch: Sequence[Number], row: int) -> Number:
+    return scratch[row]
 
 
-def load_number_if(marker: Any, s: Sequence[Number], row: int) -> Any:
-    return marker if marker is _UNUSED else s[row]
+def load_number_if(marker: Any, scratch: Sequence[Number], row: int) -> Any:
+    return marker if marker is _UNUSED else scratch[row]
 
 
-def store_number(s: list[Number], row: int, x: Any) -> None:
+def store_number(scratch: list[Number], row: int, x: Any) -> None:
     if x is not _UNUSED:
-        s[row] = x if type(x) is Number else Number(_double(x))
+        scratch[row] = x if type(x) is Number else Number(_double(x))
 
 
-def load_constant(g: Sequence[Number], i: int) -> Number:
-    return g[i]
+def load_constant(constants: Sequence[Number], i: int) -> Number:
+    return constants[i]
 
 
 broadcast = Number  # The compiled `broadcast` copies a double to all eight lanes of a vector.
@@ -244,15 +246,22 @@ integers_at = doubles_at
 
 
 def read_rows(
-    m: int, x: Sequence[float], at: int, stride: int, count: int, s: list[Number], row: int
+    m: int, x: Sequence[float], at: int, stride: int, count: int, scratch: list[Number], row: int
 ) -> None:
-    s[row : row + count] = map(Number, x[at : at + count])
+    scratch[row : row + count] = map(Number, x[at : at + count])
 
 
 def write_rows(
-    m: int, s: Sequence[Number], rows: Sequence[int], first: int, count: int, to: list[float], at: int, _: int
+    m: int,
+    scratch: Sequence[Number],
+    rows: Sequence[int],
+    first: int,
+    count: int,
+    to: list[float],
+    at: int,
+    _: int,
 ) -> None:
-    to[at : at + count] = [s[row].x for row in rows[first : first + count]]
+    to[at : at + count] = [scratch[row].x for row in rows[first : first + count]]
 
 
 def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Number:
@@ -260,7 +269,7 @@ def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Numbe
 
 
 def is_in_range(total: Number) -> bool:
-    return total.x < LARGE * LARGE
+    return total.x < NO_OVERFLOW_BOUND * NO_OVERFLOW_BOUND
 
 
 def wait_for_writes(*_: object) -> None:
@@ -273,7 +282,7 @@ stream = wait_for_writes
 # -- sine and cosine -------------------------------------------------------------------------------------
 
 
-def sine_cosine(s: object, row: int, angle: Number) -> tuple[Number, Number]:
+def sine_cosine(scratch: object, row: int, angle: Number) -> tuple[Number, Number]:
     """Return (sine, cosine) of an angle.
 
     See `urdfkin.compiled.machine.sine` for the steps.
@@ -281,7 +290,7 @@ def sine_cosine(s: object, row: int, angle: Number) -> tuple[Number, Number]:
     x = angle.x
     if not abs(x) < LARGEST_ANGLE:
         return (Number(math.sin(x)), Number(math.cos(x))) if math.isfinite(x) else (Number(math.nan),) * 2
-    n = fma(x, _2_PI, NO_FRACTION) - NO_FRACTION
+    n = fma(x, _TWO_OVER_PI, ROUNDING_SHIFT) - ROUNDING_SHIFT
     near = fma(n, -PI_2, x)
     r = fma(n, -PI_2_REST, near)
     r_error = fma(n, -PI_2_REST, near - r)

@@ -13,8 +13,8 @@ world axes. The joint axis and the interorigin vector have constant components i
 
 | `axes` | joint axis and interorigin vector | velocities and accelerations of the previous link |
 |---|---|---|
-| `world_axes` | rotated by R | unchanged |
-| `link_axes` | constant; the joint axis is (0, 0, 1) | rotated to the next link's axes |
+| `select_world_axes` | rotated by R | unchanged |
+| `select_link_axes` | constant; the joint axis is (0, 0, 1) | rotated to the next link's axes |
 
 The recursion uses the axes in which the result is requested. If the result were rotated to these axes at the
 end, this rotation would add rounding errors.
@@ -97,12 +97,12 @@ _SAVE, _RESTORE, _STORE_AXIS, _COLUMN = map(int, (Op.SAVE, Op.RESTORE, Op.STORE_
 # -- axes -------------------------------------------------------------------------------------------
 
 
-def link_axes(own, world):
-    return own
+def select_link_axes(in_link_axes, in_world_axes):
+    return in_link_axes
 
 
-def world_axes(own, world):
-    return world
+def select_world_axes(in_link_axes, in_world_axes):
+    return in_world_axes
 
 
 def express(axes, R, x):
@@ -148,20 +148,22 @@ def rotate_frame(axes, state, S):
     )
 
 
-def _rotate_about_z(axes, state, s, row):
+def _rotate_about_z(axes, state, scratch, row):
     """Rotate the frame about z (7.5).
 
     Scratch row `row` contains the sine, row `row + 1` the cosine.
     """
-    return rotate_frame(axes, state, eq.about_z(load_number(s, row), load_number(s, row + 1), zero(), one()))
+    return rotate_frame(
+        axes, state, eq.about_z(load_number(scratch, row), load_number(scratch, row + 1), zero(), one())
+    )
 
 
-def after_revolute(axes, state, s, row, v, a):
+def after_revolute(axes, state, scratch, row, v, a):
     """Compute the state after a revolute joint (7.127, 7.129)."""
     R, p, w, vel, alpha, acc = state
     z = express(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
-    return _rotate_about_z(axes, (R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), s, row)
+    return _rotate_about_z(axes, (R, p, eq.angular_velocity(w, z, v), vel, alpha, acc), scratch, row)
 
 
 def after_prismatic(axes, state, slide, v, a):
@@ -193,53 +195,67 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
     )
 
 
-def _joint_coordinate(s, row, g, c, is_mimic):
+def _joint_coordinate(scratch, row, constants, rule, is_mimic):
     """Return a joint's coordinate.
 
     The product and the sum of a mimic rule are rounded separately, as in Pinocchio.
     """
-    x = load_number(s, row)
+    x = load_number(scratch, row)
     if is_mimic:
-        x = round_product(load_constant(g, c) * x) + load_constant(g, c + 1)
+        x = round_product(load_constant(constants, rule) * x) + load_constant(constants, rule + 1)
     return x
 
 
-def _joint_rate(marker, s, row, g, c, is_mimic):
-    x = load_number_if(marker, s, row)
+def _joint_rate(marker, scratch, row, constants, rule, is_mimic):
+    x = load_number_if(marker, scratch, row)
     if is_mimic:
-        x = round_product(load_constant(g, c) * x)
+        x = round_product(load_constant(constants, rule) * x)
     return x
 
 
-def _load_vector_if(marker, s, row):
+def _load_vector_if(marker, scratch, row):
     return (
-        load_number_if(marker[0], s, row),
-        load_number_if(marker[1], s, row + 1),
-        load_number_if(marker[2], s, row + 2),
+        load_number_if(marker[0], scratch, row),
+        load_number_if(marker[1], scratch, row + 1),
+        load_number_if(marker[2], scratch, row + 2),
     )
 
 
-def _after_planar(axes, state, s, q, row, v, a):
-    state = translate_frame(axes, state, (load_number(s, q), load_number(s, q + 1), zero()))
-    state = _rotate_about_z(axes, state, s, row)
+def _after_planar(axes, state, scratch, q, row, v, a):
+    state = translate_frame(axes, state, (load_number(scratch, q), load_number(scratch, q + 1), zero()))
+    state = _rotate_about_z(axes, state, scratch, row)
     w, alpha = state[2][0], state[4][0]
     o, u = (
-        (zero(), zero(), load_number_if(w, s, v + 2)),
-        (load_number_if(w, s, v), load_number_if(w, s, v + 1), zero()),
+        (zero(), zero(), load_number_if(w, scratch, v + 2)),
+        (load_number_if(w, scratch, v), load_number_if(w, scratch, v + 1), zero()),
     )
-    o_rate = zero(), zero(), load_number_if(alpha, s, a + 2)
+    o_rate = zero(), zero(), load_number_if(alpha, scratch, a + 2)
     return add_free_motion(
-        axes, state, o, u, o_rate, (load_number_if(alpha, s, a), load_number_if(alpha, s, a + 1), zero())
+        axes,
+        state,
+        o,
+        u,
+        o_rate,
+        (load_number_if(alpha, scratch, a), load_number_if(alpha, scratch, a + 1), zero()),
     )
 
 
-def _after_floating(axes, state, s, q, v, a):
-    state = translate_frame(axes, state, (load_number(s, q), load_number(s, q + 1), load_number(s, q + 2)))
-    x, y, z, w = load_number(s, q + 3), load_number(s, q + 4), load_number(s, q + 5), load_number(s, q + 6)
+def _after_floating(axes, state, scratch, q, v, a):
+    state = translate_frame(
+        axes, state, (load_number(scratch, q), load_number(scratch, q + 1), load_number(scratch, q + 2))
+    )
+    x, y, z, w = (
+        load_number(scratch, q + 3),
+        load_number(scratch, q + 4),
+        load_number(scratch, q + 5),
+        load_number(scratch, q + 6),
+    )
     state = rotate_frame(axes, state, eq.rotation_of_quaternion(x, y, z, w))
     w, alpha = state[2], state[4]
-    u, o = _load_vector_if(w, s, v), _load_vector_if(w, s, v + 3)
-    return add_free_motion(axes, state, o, u, _load_vector_if(alpha, s, a + 3), _load_vector_if(alpha, s, a))
+    u, o = _load_vector_if(w, scratch, v), _load_vector_if(w, scratch, v + 3)
+    return add_free_motion(
+        axes, state, o, u, _load_vector_if(alpha, scratch, a + 3), _load_vector_if(alpha, scratch, a)
+    )
 
 
 def _shift_position(state, d):
@@ -250,55 +266,63 @@ def _shift_position(state, d):
 # -- constants -----------------------------------------------------------------------------------------
 
 
-def _constant_vector(g, i):
-    return load_constant(g, i), load_constant(g, i + 1), load_constant(g, i + 2)
+def _constant_vector(constants, i):
+    return load_constant(constants, i), load_constant(constants, i + 1), load_constant(constants, i + 2)
 
 
-def _constant_rotation(g, i):
-    return _constant_vector(g, i), _constant_vector(g, i + 3), _constant_vector(g, i + 6)
+def _constant_rotation(constants, i):
+    return (
+        _constant_vector(constants, i),
+        _constant_vector(constants, i + 3),
+        _constant_vector(constants, i + 6),
+    )
 
 
 # -- states in scratch memory --------------------------------------------------------------------------
 
 
-def store_vector(s, row, x):
-    store_number(s, row, x[0])
-    store_number(s, row + 1, x[1])
-    store_number(s, row + 2, x[2])
+def store_vector(scratch, row, x):
+    store_number(scratch, row, x[0])
+    store_number(scratch, row + 1, x[1])
+    store_number(scratch, row + 2, x[2])
 
 
-def load_vector(s, row):
-    return load_number(s, row), load_number(s, row + 1), load_number(s, row + 2)
+def load_vector(scratch, row):
+    return load_number(scratch, row), load_number(scratch, row + 1), load_number(scratch, row + 2)
 
 
-def _save_state(s, row, state):
+def _save_state(scratch, row, state):
     R, p, w, vel, alpha, acc = state
-    store_vector(s, row, R[0])
-    store_vector(s, row + 3, R[1])
-    store_vector(s, row + 6, R[2])
-    store_vector(s, row + 9, p)
-    store_vector(s, row + 12, w)
-    store_vector(s, row + 15, vel)
-    store_vector(s, row + 18, alpha)
-    store_vector(s, row + 21, acc)
+    store_vector(scratch, row, R[0])
+    store_vector(scratch, row + 3, R[1])
+    store_vector(scratch, row + 6, R[2])
+    store_vector(scratch, row + 9, p)
+    store_vector(scratch, row + 12, w)
+    store_vector(scratch, row + 15, vel)
+    store_vector(scratch, row + 18, alpha)
+    store_vector(scratch, row + 21, acc)
 
 
-def _restore_state(s, row, state):
+def _restore_state(scratch, row, state):
     R, p, w, vel, alpha, acc = state
     return (
-        (_load_vector_if(R[0], s, row), _load_vector_if(R[1], s, row + 3), _load_vector_if(R[2], s, row + 6)),
-        _load_vector_if(p, s, row + 9),
-        _load_vector_if(w, s, row + 12),
-        _load_vector_if(vel, s, row + 15),
-        _load_vector_if(alpha, s, row + 18),
-        _load_vector_if(acc, s, row + 21),
+        (
+            _load_vector_if(R[0], scratch, row),
+            _load_vector_if(R[1], scratch, row + 3),
+            _load_vector_if(R[2], scratch, row + 6),
+        ),
+        _load_vector_if(p, scratch, row + 9),
+        _load_vector_if(w, scratch, row + 12),
+        _load_vector_if(vel, scratch, row + 15),
+        _load_vector_if(alpha, scratch, row + 18),
+        _load_vector_if(acc, scratch, row + 21),
     )
 
 
 # -- inputs --------------------------------------------------------------------------------------------
 
 
-def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
+def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row):
     """Read whole blocks of eight numbers, which is faster.
 
     For example, if nq is 6, the function may read eight numbers. The two additional numbers go to the
@@ -306,73 +330,81 @@ def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """
     for i in range(begin, end):
         at = blocks[i]
-        first, wide = b * stride + at, width - at
+        first, wide = start * stride + at, width - at
         if wide > 8 or first + (m - 1) * stride + 8 <= n * stride:
             wide = 8
-        read_rows(m if stride else 1, x, first, stride, wide, s, row + at)
+        read_rows(m if stride else 1, x, first, stride, wide, scratch, row + at)
 
 
-def _base_state(axes, m, s, args, row, b):
+def _base_state(axes, m, scratch, args, row, start):
     nil, unit = broadcast(0.0), broadcast(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
     if args[_BASE] != 0:
         base, stride = doubles_at(args[_BASE]), args[_STRIDE_BASE]
-        read_rows(m if stride else 1, base, b * stride, stride, STATE_ROWS, s, row)
+        read_rows(m if stride else 1, base, start * stride, stride, STATE_ROWS, scratch, row)
         R, p = (
-            (load_vector(s, row), load_vector(s, row + 3), load_vector(s, row + 6)),
-            load_vector(s, row + 9),
+            (load_vector(scratch, row), load_vector(scratch, row + 3), load_vector(scratch, row + 6)),
+            load_vector(scratch, row + 9),
         )
         w, vel = (
-            express_after_rotation(axes, R, load_vector(s, row + 12)),
-            express_after_rotation(axes, R, load_vector(s, row + 15)),
+            express_after_rotation(axes, R, load_vector(scratch, row + 12)),
+            express_after_rotation(axes, R, load_vector(scratch, row + 15)),
         )
         alpha, acc = (
-            express_after_rotation(axes, R, load_vector(s, row + 18)),
-            express_after_rotation(axes, R, load_vector(s, row + 21)),
+            express_after_rotation(axes, R, load_vector(scratch, row + 18)),
+            express_after_rotation(axes, R, load_vector(scratch, row + 21)),
         )
     return R, p, w, vel, alpha, acc
 
 
-def _sines_and_cosines(s, program, g):
+def _sines_and_cosines(scratch, program, constants):
     """Compute all sines and cosines first, because the recursion needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
-        angle = _joint_coordinate(s, program[i], g, program[i + 2], program[i + 3])
-        sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
-        store_number(s, program[i + 1], sine)
-        store_number(s, program[i + 1] + 1, cosine)
+        angle = _joint_coordinate(scratch, program[i], constants, program[i + 2], program[i + 3])
+        sine, cosine = sine_cosine(scratch, ANGLE_ROW, angle)
+        store_number(scratch, program[i + 1], sine)
+        store_number(scratch, program[i + 1] + 1, cosine)
 
 
 # -- the recursion -------------------------------------------------------------------------------------
 
 
-def _execute_transform(axes, op, state, g, c):
+def _execute_transform(axes, op, state, constants, index):
     if op == _TRANSLATE_X:
-        state = translate_frame(axes, state, (load_constant(g, c), zero(), zero()))
+        state = translate_frame(axes, state, (load_constant(constants, index), zero(), zero()))
     elif op == _TRANSLATE_Y:
-        state = translate_frame(axes, state, (zero(), load_constant(g, c + 1), zero()))
+        state = translate_frame(axes, state, (zero(), load_constant(constants, index + 1), zero()))
     elif op == _TRANSLATE_Z:
-        state = translate_frame(axes, state, (zero(), zero(), load_constant(g, c + 2)))
+        state = translate_frame(axes, state, (zero(), zero(), load_constant(constants, index + 2)))
     elif op == _TRANSLATE:
-        state = translate_frame(axes, state, _constant_vector(g, c))
+        state = translate_frame(axes, state, _constant_vector(constants, index))
     elif op == _ROTATE_X:
         state = rotate_frame(
-            axes, state, eq.about_x(load_constant(g, c + 7), load_constant(g, c + 4), zero(), one())
+            axes,
+            state,
+            eq.about_x(
+                load_constant(constants, index + 7), load_constant(constants, index + 4), zero(), one()
+            ),
         )
     elif op == _ROTATE_Y:
         state = rotate_frame(
-            axes, state, eq.about_y(load_constant(g, c + 2), load_constant(g, c), zero(), one())
+            axes,
+            state,
+            eq.about_y(load_constant(constants, index + 2), load_constant(constants, index), zero(), one()),
         )
     elif op == _ROTATE_Z:
         state = rotate_frame(
-            axes, state, eq.about_z(load_constant(g, c + 3), load_constant(g, c), zero(), one())
+            axes,
+            state,
+            eq.about_z(load_constant(constants, index + 3), load_constant(constants, index), zero(), one()),
         )
     else:
-        state = rotate_frame(axes, state, _constant_rotation(g, c))
+        state = rotate_frame(axes, state, _constant_rotation(constants, index))
     return state
 
 
-def _execute_joint(axes, op, state, s, x, v, a, z, g, c):
+def _execute_joint(axes, op, state, scratch, x, v, a, z, constants, rule):
     """Execute a joint's instruction.
 
     | operand | content |
@@ -380,96 +412,138 @@ def _execute_joint(axes, op, state, s, x, v, a, z, g, c):
     | x | scratch row of the sine (revolute) or of the first coordinate |
     | v, a | scratch rows of the joint's velocity and acceleration |
     | z | planar: scratch row of the sine; revolute, prismatic: 1 with a mimic rule, else 0 |
-    | c | index of the mimic rule's constants in `g` |
+    | rule | index of the mimic rule's constants in `constants` |
     """
     if op == _REVOLUTE:
-        rate, rate_2 = _joint_rate(state[2][0], s, v, g, c, z), _joint_rate(state[4][0], s, a, g, c, z)
-        state = after_revolute(axes, state, s, x, rate, rate_2)
+        rate, rate_2 = (
+            _joint_rate(state[2][0], scratch, v, constants, rule, z),
+            _joint_rate(state[4][0], scratch, a, constants, rule, z),
+        )
+        state = after_revolute(axes, state, scratch, x, rate, rate_2)
     elif op == _PRISMATIC:
-        rate, rate_2 = _joint_rate(state[2][0], s, v, g, c, z), _joint_rate(state[4][0], s, a, g, c, z)
-        state = after_prismatic(axes, state, _joint_coordinate(s, x, g, c, z), rate, rate_2)
+        rate, rate_2 = (
+            _joint_rate(state[2][0], scratch, v, constants, rule, z),
+            _joint_rate(state[4][0], scratch, a, constants, rule, z),
+        )
+        state = after_prismatic(axes, state, _joint_coordinate(scratch, x, constants, rule, z), rate, rate_2)
     elif op == _PLANAR:
-        state = _after_planar(axes, state, s, x, z, v, a)
+        state = _after_planar(axes, state, scratch, x, z, v, a)
     else:
-        state = _after_floating(axes, state, s, x, v, a)
+        state = _after_floating(axes, state, scratch, x, v, a)
     return state
 
 
-def _read_inputs(m, args, program, s, b, orders):
+def _read_inputs(m, args, program, scratch, start, orders):
     q, n, nq, nv = doubles_at(args[_Q]), args[_N], program[_NQ], program[_NV]
     edge, end = program[_BLOCKS_V], program[_BLOCKS_END]
-    _read_blocks(m, q, n, b, nq, args[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
+    _read_blocks(
+        m, q, n, start, nq, args[_STRIDE_Q], program, program[_BLOCKS_Q], edge, scratch, program[_ROW_Q]
+    )
     if orders > 1:
         v = doubles_at(args[_V])
-        _read_blocks(m, v, n, b, nv, args[_STRIDE_V], program, edge, end, s, program[_ROW_V])
+        _read_blocks(m, v, n, start, nv, args[_STRIDE_V], program, edge, end, scratch, program[_ROW_V])
     if orders > 2:
         a = doubles_at(args[_A])
-        _read_blocks(m, a, n, b, nv, args[_STRIDE_A], program, edge, end, s, program[_ROW_A])
+        _read_blocks(m, a, n, start, nv, args[_STRIDE_A], program, edge, end, scratch, program[_ROW_A])
 
 
-def _add_input_squares(total, m, args, program, b, orders):
-    total = _add_block_squares(total, m, doubles_at(args[_Q]), b, program[_NQ], args[_STRIDE_Q])
+def _add_input_squares(total, m, args, program, start, orders):
+    total = _add_block_squares(total, m, doubles_at(args[_Q]), start, program[_NQ], args[_STRIDE_Q])
     if orders > 1:
-        total = _add_block_squares(total, m, doubles_at(args[_V]), b, program[_NV], args[_STRIDE_V])
+        total = _add_block_squares(total, m, doubles_at(args[_V]), start, program[_NV], args[_STRIDE_V])
     if orders > 2:
-        total = _add_block_squares(total, m, doubles_at(args[_A]), b, program[_NV], args[_STRIDE_A])
+        total = _add_block_squares(total, m, doubles_at(args[_A]), start, program[_NV], args[_STRIDE_A])
     return total
 
 
-def _add_block_squares(total, m, x, b, width, stride):
-    return add_squares(total, x, b * stride, (m if stride else 1) * width)
+def _add_block_squares(total, m, x, start, width, stride):
+    return add_squares(total, x, start * stride, (m if stride else 1) * width)
 
 
-def _compute_block(axes, m, args, program, g, s, b, reference, orders, mask, store, column, write):
-    _read_inputs(m, args, program, s, b, orders)
-    _sines_and_cosines(s, program, g)
-    state = mask(_base_state(axes, m, s, args, program[_ROW_BASE], b))
-    at, stage = program[_CODE], args[_BUFFER]
-    to, first = (doubles_at(stage), 0) if stage else (doubles_at(args[_OUT]), b)
+def _compute_block(
+    axes,
+    m,
+    args,
+    program,
+    constants,
+    scratch,
+    start,
+    reference,
+    orders,
+    state_for_output,
+    store_axis,
+    write_column,
+    write_frame,
+):
+    _read_inputs(m, args, program, scratch, start, orders)
+    _sines_and_cosines(scratch, program, constants)
+    state = state_for_output(_base_state(axes, m, scratch, args, program[_ROW_BASE], start))
+    at, buffer = program[_CODE], args[_BUFFER]
+    to, first = (doubles_at(buffer), 0) if buffer else (doubles_at(args[_OUT]), start)
     if args[_BASE] == 0 and _TRANSLATE_X <= program[at] <= _TRANSLATE:
         # The base is at rest.
         # If the first instruction is a translation, only the position changes.
-        state = _shift_position(state, _constant_vector(g, program[at + 4]))
+        state = _shift_position(state, _constant_vector(constants, program[at + 4]))
         at += INSTRUCTION_WIDTH
     while program[at] != _END:
-        op, x, y, z, c = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
+        op, x, y, z, index = program[at], program[at + 1], program[at + 2], program[at + 3], program[at + 4]
         at += INSTRUCTION_WIDTH
         if op <= _ROTATE:
-            state = _execute_transform(axes, op, state, g, c)
+            state = _execute_transform(axes, op, state, constants, index)
         elif op <= _FLOATING:
-            state = _execute_joint(axes, op, state, s, x, program[_ROW_V] + y, program[_ROW_A] + y, z, g, c)
+            state = _execute_joint(
+                axes, op, state, scratch, x, program[_ROW_V] + y, program[_ROW_A] + y, z, constants, index
+            )
         elif op == _SAVE:
-            _save_state(s, x, state)
+            _save_state(scratch, x, state)
         elif op == _RESTORE:
-            state = _restore_state(s, x, state)
+            state = _restore_state(scratch, x, state)
         elif op == _STORE_AXIS:
-            store(s, x, y, state)
+            store_axis(scratch, x, y, state)
         elif op == _COLUMN:
-            column(s, x, y, z, g, c, reference, state)
+            write_column(scratch, x, y, z, constants, index, reference, state)
         else:
-            write(m, s, program, x, y, first, reference, state, to)
-    if stage:
+            write_frame(m, scratch, program, x, y, first, reference, state, to)
+    if buffer:
         width = args[_OUTPUT_WIDTH]
-        stream(to, m * width, doubles_at(args[_OUT]), b * width, args[_OUT])
+        stream(to, m * width, doubles_at(args[_OUT]), start * width, args[_OUT])
 
 
-def forward_recursion(address, axes, orders, mask, store, column, write):
+def forward_recursion(address, axes, orders, state_for_output, store_axis, write_column, write_frame):
     """Execute a program for every block of configurations.
 
     `orders` is 1 for q, 2 for q and v, 3 for q, v and a.
     Return 1 for nan, inf or too large inputs, else 0.
     """
     args = integers_at(address)
-    program, g, s = integers_at(args[_PROGRAM]), doubles_at(args[_CONSTANTS]), doubles_at(args[_SCRATCH])
-    store_number(s, ZERO_ROW, zero())
-    store_number(s, ONE_ROW, one())
+    program, constants, scratch = (
+        integers_at(args[_PROGRAM]),
+        doubles_at(args[_CONSTANTS]),
+        doubles_at(args[_SCRATCH]),
+    )
+    store_number(scratch, ZERO_ROW, zero())
+    store_number(scratch, ONE_ROW, one())
     n = args[_N]
     m = LANES if n >= LANES else 1
     total = broadcast(0.0)
     for first in range(0, n, m):
-        b = min(first, n - m)  # The last block may overlap the block before it.
-        total = _add_input_squares(total, m, args, program, b, orders)
-        _compute_block(axes, m, args, program, g, s, b, args[_REFERENCE], orders, mask, store, column, write)
+        start = min(first, n - m)  # The last block may overlap the block before it.
+        total = _add_input_squares(total, m, args, program, start, orders)
+        _compute_block(
+            axes,
+            m,
+            args,
+            program,
+            constants,
+            scratch,
+            start,
+            args[_REFERENCE],
+            orders,
+            state_for_output,
+            store_axis,
+            write_column,
+            write_frame,
+        )
     if args[_BUFFER]:
         wait_for_writes()
     return 0 if is_in_range(total) else 1

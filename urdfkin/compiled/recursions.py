@@ -11,9 +11,9 @@ addresses. The result is 1 if an input is nan, infinite or too large, else 0.
 from __future__ import annotations
 
 from urdfkin.compiled.outputs import (
-    mask_for_acceleration,
-    mask_for_placement,
-    mask_for_velocity,
+    state_for_acceleration,
+    state_for_placement,
+    state_for_velocity,
     store_axis,
     store_moving_axis,
     store_no_axis,
@@ -27,58 +27,64 @@ from urdfkin.compiled.outputs import (
     write_placement,
     write_velocity,
 )
-from urdfkin.compiled.recursion import forward_recursion, link_axes, world_axes
+from urdfkin.compiled.recursion import forward_recursion, select_link_axes, select_world_axes
 
 
 def placements(args):
     return forward_recursion(
-        args, world_axes, 1, mask_for_placement, store_no_axis, write_no_column, write_placement
+        args, select_world_axes, 1, state_for_placement, store_no_axis, write_no_column, write_placement
     )
 
 
 def velocities(args):
     return forward_recursion(
-        args, world_axes, 2, mask_for_velocity, store_no_axis, write_no_column, write_velocity
+        args, select_world_axes, 2, state_for_velocity, store_no_axis, write_no_column, write_velocity
     )
 
 
 def local_velocities(args):
     return forward_recursion(
-        args, link_axes, 2, mask_for_velocity, store_no_axis, write_no_column, write_velocity
+        args, select_link_axes, 2, state_for_velocity, store_no_axis, write_no_column, write_velocity
     )
 
 
 def accelerations(args):
     return forward_recursion(
-        args, world_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_acceleration
+        args, select_world_axes, 3, state_for_acceleration, store_no_axis, write_no_column, write_acceleration
     )
 
 
 def local_accelerations(args):
     return forward_recursion(
-        args, link_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_acceleration
+        args, select_link_axes, 3, state_for_acceleration, store_no_axis, write_no_column, write_acceleration
     )
 
 
 def jacobians(args):
     return forward_recursion(
-        args, world_axes, 1, mask_for_placement, store_axis, write_jacobian_column, write_matrix
+        args, select_world_axes, 1, state_for_placement, store_axis, write_jacobian_column, write_matrix
     )
 
 
 def jacobian_rates(args):
     return forward_recursion(
-        args, world_axes, 2, mask_for_velocity, store_moving_axis, write_jacobian_rate_column, write_matrix
+        args,
+        select_world_axes,
+        2,
+        state_for_velocity,
+        store_moving_axis,
+        write_jacobian_rate_column,
+        write_matrix,
     )
 
 
 def hessians(args):
     return forward_recursion(
-        args, world_axes, 1, mask_for_placement, store_axis, write_jacobian_column, write_hessian
+        args, select_world_axes, 1, state_for_placement, store_axis, write_jacobian_column, write_hessian
     )
 
 
 def imus(args):
     return forward_recursion(
-        args, link_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_imu
+        args, select_link_axes, 3, state_for_acceleration, store_no_axis, write_no_column, write_imu
     )

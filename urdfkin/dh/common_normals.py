@@ -33,10 +33,10 @@ from urdfkin.kinematics.roundings import (
     ANGLE_ROUNDINGS,
     AXIS_ROUNDINGS,
     CONSTANT_POSE_ROUNDINGS,
-    DECIMAL_ROUNDINGS,
     EPS,
-    FILE_ROUNDINGS,
+    FILE_ANGLE_ROUNDINGS,
     LENGTH_ROUNDINGS,
+    SNAPPED_LENGTH_ROUNDINGS,
 )
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
@@ -170,7 +170,7 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
     if abs(length) <= max(LENGTH_ROUNDINGS * EPS * reach, noise):
         return 0.0
     short = float(f"{length:.12g}")
-    return short if abs(length - short) <= DECIMAL_ROUNDINGS * EPS * reach else float(length)
+    return short if abs(length - short) <= SNAPPED_LENGTH_ROUNDINGS * EPS * reach else float(length)
 
 
 @dataclass(frozen=True, slots=True)
@@ -407,7 +407,7 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     """
     computed = (AXIS_ROUNDINGS + CONSTANT_POSE_ROUNDINGS * joints) * EPS
     return PoseTolerance(
-        computed + FILE_ROUNDINGS * joints * EPS, max(LENGTH_ROUNDINGS * EPS * reach, computed * length)
+        computed + FILE_ANGLE_ROUNDINGS * joints * EPS, max(LENGTH_ROUNDINGS * EPS * reach, computed * length)
     )
 
 

@@ -29,7 +29,7 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinErr
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNIT_SHORT_NAMES
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.rotation import ROUNDED, polar_factor
+from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor
 from urdfkin.system.files import may_exist, read_text
 from urdfkin.system.resources import robots_dir
 
@@ -326,7 +326,7 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     correction = polar_factor(pose[:3, :3]) - pose[:3, :3]
-    if ROUNDED < np.abs(correction).max() < _PRINTED_TOLERANCE:
+    if UNCHANGED_MATRIX_TOLERANCE < np.abs(correction).max() < _PRINTED_TOLERANCE:
         pose[:3, :3] += correction
     return [[float(number) for number in row] for row in pose]
 

@@ -25,7 +25,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
-from urdfkin.kinematics.rotation import ROUNDED, polar_factor, rotation_with_z_axis
+from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import ConfigurationLike
@@ -264,7 +264,7 @@ def _nearest_rigid(M: FloatArray) -> FloatArray:
     if rotation_defect(R) > _HANDWRITTEN_TOLERANCE:
         raise InputError("M must be a rotation and a translation", where="M", found=str(R.tolist()))
     nearest = polar_factor(R)
-    if np.abs(nearest - R).max() > ROUNDED:
+    if np.abs(nearest - R).max() > UNCHANGED_MATRIX_TOLERANCE:
         T[:3, :3] = nearest
     return T
 

@@ -25,7 +25,7 @@ from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
-from urdfkin.compiled.evaluate import compute_in_blocks, uses_buffer
+from urdfkin.compiled.evaluate import compute_in_threads, uses_buffer
 from urdfkin.compiled.kernel_cache import compile_lock
 from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, aligned_empty
 from urdfkin.compiled.prepared import FastFunction
@@ -341,7 +341,7 @@ class CompiledFrame:
             from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
         # The fast function checks neither the norm of a quaternion nor the range of the results.
-        needs_checks = self._tree.floating_joints or self._plan.is_large
+        needs_checks = self._tree.floating_joints or self._plan.may_overflow
         if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
         row = QUANTITIES[name]
@@ -411,7 +411,7 @@ class CompiledFrame:
         For a large batch, the conversion in `Call` takes 10 % of the time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
-        plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
+        plain = not (self._tree.floating_joints or self._plan.may_overflow) and _is_plain(
             out, (n, *row.result_shape(self._tree.nv))
         )
         width = self._tree.nq
@@ -426,7 +426,7 @@ class CompiledFrame:
         inputs = [np.ascontiguousarray(x) for x in (call.q, *call.rates)]
         result = np.empty((call.n, 1, *row.result_shape(self._tree.nv))) if out is None else out
         self._run(task, row, inputs, result, threads)
-        if self._plan.is_large and not np.isfinite(result).all():
+        if self._plan.may_overflow and not np.isfinite(result).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
         return result
 
@@ -449,5 +449,5 @@ class CompiledFrame:
                 arguments[index] = address(x)
             return int(task(arguments))
 
-        if compute_in_blocks(compute_block, inputs, out, threads):
+        if compute_in_threads(compute_block, inputs, out, threads):
             raise NotFiniteError("q, v and a must be finite")

@@ -36,8 +36,8 @@ from urdfkin.export.expression import Graph, Node, Number, find_dependencies
 from urdfkin.kinematics.roundings import (
     SINGLE_EPS,
     SINGLE_LARGEST,
-    SINGLE_OPERATION,
-    SINGLE_POLYNOMIAL,
+    SINGLE_OPERATION_ERRORS,
+    SINGLE_POLYNOMIAL_ERROR,
     SINGLE_SMALLEST,
 )
 from urdfkin.model.recursion import LinkState
@@ -272,9 +272,9 @@ def _operation_error(node: Node, x: FloatArray) -> FloatArray:
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
     elif node.op in ("sin", "cos"):
-        error = np.maximum(SINGLE_OPERATION[node.op] * size, SINGLE_POLYNOMIAL)
+        error = np.maximum(SINGLE_OPERATION_ERRORS[node.op] * size, SINGLE_POLYNOMIAL_ERROR)
     else:
-        error = SINGLE_OPERATION[node.op] * size
+        error = SINGLE_OPERATION_ERRORS[node.op] * size
     return _add_range_error(error, size)
 
 

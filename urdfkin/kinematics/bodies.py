@@ -51,7 +51,7 @@ from urdfkin.kinematics.inputs import (
 )
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.kinematics.rotation import (
-    NEAREST,
+    MIN_SINGULARITY_DISTANCE,
     euler_of,
     euler_rate_inverse,
     euler_rate_matrix,
@@ -286,56 +286,58 @@ def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 
-def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
+def pose_rate_matrix(representation: str, R: ArrayLike) -> FloatArray:
     """Return C = diag(I, Omega) in [d-dot; w] = C x-dot (7.119, 7.120).
 
     For a quaternion, Omega is 4 E^T, with E of 7.57.
     """
     if representation == QUATERNION:
-        return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
-    return _blocks(euler_rate_matrix(representation, euler_of(representation, R)))
+        return _block_diagonal(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
+    return _block_diagonal(euler_rate_matrix(representation, euler_of(representation, R)))
 
 
-def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
+def pose_rate_inverse(
+    representation: str, R: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
+) -> FloatArray:
     """Return C^-1 in x-dot = C^-1 [d-dot; w] (7.122).
 
     For a quaternion, C (6, 7) has several right inverses C^-1: C C^-1 = I.
     The returned inverse gives rates perpendicular to the quaternion.
     """
     if representation == QUATERNION:
-        return _blocks(quaternion_rate_matrix(quaternion_of(R)))
-    return _blocks(euler_rate_inverse(representation, euler_of(representation, R), nearest))
+        return _block_diagonal(quaternion_rate_matrix(quaternion_of(R)))
+    return _block_diagonal(euler_rate_inverse(representation, euler_of(representation, R), nearest))
 
 
 def analytical_jacobian(
-    representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
+    representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
 ) -> FloatArray:
     """Return the manipulator Jacobian J = C^-1 J_v (7.122)."""
-    return representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
+    return pose_rate_inverse(representation, R, nearest) @ _as_matrices_with_rows(J_v, "J_v", 6)
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
     """Return the velocity Jacobian J_v = C J (7.121)."""
-    C = representation_matrix(representation, R)
-    return C @ _rows(J, "J", C.shape[-1])
+    C = pose_rate_matrix(representation, R)
+    return C @ _as_matrices_with_rows(J, "J", C.shape[-1])
 
 
 def pose_rates(
-    representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
+    representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
 ) -> FloatArray:
     """Return x-dot = C^-1 [d-dot; w]."""
     column = as_vectors(velocity, "velocity", 6)[..., np.newaxis]
-    return (representation_inverse(representation, R, nearest) @ column)[..., 0]
+    return (pose_rate_inverse(representation, R, nearest) @ column)[..., 0]
 
 
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
     """Return [d-dot; w] = C x-dot (7.119)."""
-    C = representation_matrix(representation, R)
+    C = pose_rate_matrix(representation, R)
     column = as_vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
     return (C @ column)[..., 0]
 
 
-def _blocks(lower: FloatArray) -> FloatArray:
+def _block_diagonal(lower: FloatArray) -> FloatArray:
     rows, columns = lower.shape[-2:]
     C = np.zeros((*lower.shape[:-2], 3 + rows, 3 + columns))
     C[..., :3, :3] = np.eye(3)
@@ -343,7 +345,7 @@ def _blocks(lower: FloatArray) -> FloatArray:
     return C
 
 
-def _rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
+def _as_matrices_with_rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
     array = as_finite(value, name)
     columns = array.shape[-1] if array.ndim else 0
     return as_matrices(array, name, rows, columns)

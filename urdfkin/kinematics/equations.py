@@ -233,7 +233,7 @@ def rate_in_turning_axes(rate, w, x):
 # Time derivative of column i (7.126): sum over all joints j of d(column i)/dq_j * v_j
 
 
-def turned_along(w, linear, angular):
+def derivative_by_earlier_joint(w, linear, angular):
     """7.85: derivative of column i with respect to joint j <= i.
 
     w:  angular part of column j
@@ -241,7 +241,7 @@ def turned_along(w, linear, angular):
     return cross(w, linear), cross(w, angular)
 
 
-def end_moved(z, linear):
+def derivative_by_later_joint(z, linear):
     """7.85: derivative of joint i's vector z x d with respect to joint j > i.
 
     linear:  linear part of column j

@@ -34,8 +34,8 @@ _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
     "interorigin_vector": {"a": "a_i", "d": "d_i"},
-    "turned_along": {"w": "z_j", "linear": "v_i", "angular": r"\omega_i"},
-    "end_moved": {"z": "z_i", "linear": "v_j"},
+    "derivative_by_earlier_joint": {"w": "z_j", "linear": "v_i", "angular": r"\omega_i"},
+    "derivative_by_later_joint": {"z": "z_i", "linear": "v_j"},
     "motion_product": {
         "linear_1": "v_1",
         "linear_2": "v_2",

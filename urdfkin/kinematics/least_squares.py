@@ -19,8 +19,8 @@ _MOST_STEPS = 100
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
 #: Factor of the damping after a step that reduces the error, and factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: A step is slow if new error > _SLOW * old error.
-_SLOW = 0.99
+#: A step is slow if new error > _SLOW_STEP_RATIO * old error.
+_SLOW_STEP_RATIO = 0.99
 #: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
 #: The norm of n residuals has a relative rounding error of at most this number times n eps.
@@ -63,7 +63,7 @@ def least_squares(
                     state, error, r, intermediate = trial, trial_error, trial_r, trial_intermediate
                     break
             damping *= _DAMPING_INCREASE
-        slow = slow + 1 if error > _SLOW * before else 0
+        slow = slow + 1 if error > _SLOW_STEP_RATIO * before else 0
         if error >= before * (1.0 - _NORM_ROUNDING * EPS * len(r)) or slow == patience > 0:
             break
         damping = max(_DAMPING_DECREASE * damping, _LEAST_DAMPING)

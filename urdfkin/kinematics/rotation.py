@@ -97,7 +97,7 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
 
 
 #: A matrix is used unchanged if no entry differs from the nearest rotation by more than this number.
-ROUNDED = 1e-15
+UNCHANGED_MATRIX_TOLERANCE = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
@@ -408,8 +408,8 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return axis, 2.0 * np.arctan2(sine, scalar)
 
 
-_AXES = "xyz"
-_TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
+_AXIS_LETTERS = "xyz"
+_TRIPLES = [a + b + c for a in _AXIS_LETTERS for b in _AXIS_LETTERS for c in _AXIS_LETTERS if a != b != c]
 #: Twelve Euler sequences about moving axes, twelve about fixed axes.
 EULER_SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -453,7 +453,7 @@ def find_sequence(name: str) -> EulerSequence:
 def _make_sequence(name: str) -> EulerSequence:
     is_fixed = name.islower()
     letters = name.lower()[::-1] if is_fixed else name.lower()
-    first, second, third = (_AXES.index(letter) for letter in letters)
+    first, second, third = (_AXIS_LETTERS.index(letter) for letter in letters)
     other = 3 - first - second
     sign = 1.0 if (second - first) % 3 == 1 else -1.0
     return EulerSequence(name, first, second, third, other, sign, is_fixed)
@@ -537,7 +537,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
 
 
 #: At this distance (rad) or less from the singularity, Euler angle rates have too few correct digits.
-NEAREST = 1e-9
+MIN_SINGULARITY_DISTANCE = 1e-9
 
 
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
@@ -560,12 +560,14 @@ def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: Array
     return product[..., 0]
 
 
-def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
+def euler_rates(
+    name: str, angles: ArrayLike, w: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
+) -> FloatArray:
     """Return the Euler angle rates Omega^-1 w (7.56)."""
     return (euler_rate_inverse(name, angles, nearest) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
-def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
+def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE) -> FloatArray:
     """Return Omega^-1 in closed form (7.56).
 
     F:              rotation by the first angle

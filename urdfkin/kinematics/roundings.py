@@ -207,9 +207,9 @@ The counts, with u = eps/2, are
 | a rule that refers to a mimic joint: two products and a sum | 1.5 |
 | x and y by their rules, m q + c | 2.0 |
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
-| sum, at most `MJCF_RULE_ROUNDINGS` = 8 | 7.5 |
+| sum, at most `MJCF_MIMIC_ROUNDINGS` = 8 | 7.5 |
 
-    tolerance = MJCF_RULE_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)
+    tolerance = MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)
     k: number of mimic rules between the mimic joint and the independent joint
 
 **Numbers near zero.** A product below the smallest normal number loses bits:
@@ -250,7 +250,7 @@ SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
 #: `eps * scale` for the smallest nonzero scale, `SMALLEST_NORMAL`: the smallest subnormal number.
-LEAST_UNIT = EPS * SMALLEST_NORMAL
+SMALLEST_SUBNORMAL = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
@@ -265,7 +265,7 @@ PINOCCHIO_ROUNDINGS = 24.0
 #: A term has more factors because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
-MJCF_RULE_ROUNDINGS = 8.0
+MJCF_MIMIC_ROUNDINGS = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW_ROUNDINGS = 8.0
 
@@ -276,9 +276,15 @@ SINGLE_EPS = 2.0**-23
 #: Smallest normal number and largest number in single precision.
 SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
 #: Relative error (in eps) of each operation.
-SINGLE_OPERATION = dict.fromkeys("+-*", 0.5) | {"/": 1.0, "sqrt": 1.0, "neg": 0.0, "sin": 3.5, "cos": 3.5}
+SINGLE_OPERATION_ERRORS = dict.fromkeys("+-*", 0.5) | {
+    "/": 1.0,
+    "sqrt": 1.0,
+    "neg": 0.0,
+    "sin": 3.5,
+    "cos": 3.5,
+}
 #: Absolute error (in eps) of a sine or cosine that a polynomial computes.
-SINGLE_POLYNOMIAL = 1.0
+SINGLE_POLYNOMIAL_ERROR = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
@@ -298,7 +304,7 @@ AXIS_ROUNDINGS = 5.0
 #: If both joint axes are z axes, roll and pitch both change the angle between the joint axes.
 #: Yaw does not change this angle.
 #: Therefore, the error is twice 22.5 eps.
-FILE_ROUNDINGS = 45.0
+FILE_ANGLE_ROUNDINGS = 45.0
 #: Rounding error of a length along a joint axis.
 #: The unit of the error is eps times the length of the path.
 #: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
@@ -318,7 +324,7 @@ ANGLE_ROUNDINGS = 4.0
 ENTRY_ROUNDINGS = 2.0
 #: A length is rounded to twelve digits if the length changes by at most this number.
 #: The unit of the change is eps times the length of the path.
-DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
+SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
 #: The second rotation is a product of three rotations.
@@ -361,7 +367,7 @@ def table_roundings(rows: int) -> float:
     return ROW_ROUNDINGS * (rows + 1)
 
 
-def read_back_roundings(rows: int) -> float:
+def written_urdf_roundings(rows: int) -> float:
     """Return the allowed difference between the poses of a table and of its URDF.
 
     The URDF was written from the table:
@@ -378,7 +384,7 @@ def read_back_roundings(rows: int) -> float:
     return 4.0 * table_roundings(rows)
 
 
-def fit_roundings(rows: int) -> float:
+def fitted_table_roundings(rows: int) -> float:
     """Return the allowed difference between the poses of a URDF and of the table fitted to the URDF.
 
     After the last iteration of the fit, the error of the pose is at most 12.5 * table_roundings(rows).

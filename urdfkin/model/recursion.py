@@ -232,9 +232,9 @@ class Recursion:
                 change = change if is_before else eq.motion_product(*column_i, *column_j)
             case Reference.LOCAL_WORLD_ALIGNED:
                 change = (
-                    eq.turned_along(column_j[1], *column_i)
+                    eq.derivative_by_earlier_joint(column_j[1], *column_i)
                     if is_before
-                    else (eq.end_moved(column_i[1], column_j[0]), ZERO)
+                    else (eq.derivative_by_later_joint(column_i[1], column_j[0]), ZERO)
                 )
             case _:
                 assert_never(reference)

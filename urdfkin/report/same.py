@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from urdfkin.comparison.result import (
-    BOUNDED_DIFFERENCES,
+    BOUNDED_DIFFERENCE_KINDS,
     Interval,
     Sameness,
     SameQuestion,
     Verdict,
     angle,
+    interval_text,
     length,
-    up_to,
 )
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
@@ -94,7 +94,9 @@ def _within_headline(sameness: Sameness, limit: float) -> str:
     if sameness.within(limit):
         return f"{prefix}no frame is ever off by more than {_length_and_angle(*sameness.bound_as_written)}"
     if (
-        unbounded := next((one for one in sameness.differences if one.what not in BOUNDED_DIFFERENCES), None)
+        unbounded := next(
+            (one for one in sameness.differences if one.what not in BOUNDED_DIFFERENCE_KINDS), None
+        )
     ) is not None:
         return f"NOT {prefix}{unbounded.words}"
     frames = (sameness.as_written,) if sameness.as_written is not None else sameness.frames
@@ -127,7 +129,7 @@ def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float
     if any(math.isinf(most) for _, _, most in parts):
         least = " and ".join(f"{words(low)} or more" for words, low, _ in parts if low)
         return f" by {least} (no bound is proven)" if least else ", and no bound is proven"
-    seen_some = [up_to(*one) for one in parts if one[1] > 0.0]
+    seen_some = [interval_text(*one) for one in parts if one[1] > 0.0]
     bounded = [words(most) for words, low, most in parts if low <= 0.0]
     texts = [f"up to {' and '.join(seen_some)}"] if seen_some else []
     texts += [f"at most {' and '.join(bounded)}"] if bounded else []
@@ -139,9 +141,13 @@ def _describe_distance(frame: Interval, rounding: tuple[float, float]) -> str:
 
     The text contains no distance and no angle that rounding errors can explain.
     """
-    parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > ROUNDING_FACTOR * rounding[0] else []
+    parts = (
+        [interval_text(length, frame.lower, frame.upper)]
+        if frame.upper > ROUNDING_FACTOR * rounding[0]
+        else []
+    )
     if frame.radians > ROUNDING_FACTOR * rounding[1]:
-        parts.append(up_to(angle, frame.radians_seen, frame.radians))
+        parts.append(interval_text(angle, frame.radians_seen, frame.radians))
     return " and ".join(parts)
 
 

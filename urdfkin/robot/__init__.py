@@ -27,7 +27,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_int, as_names, as_str, safe_repr
 from urdfkin.export import DEFAULT_QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import as_finite, as_vectors
-from urdfkin.kinematics.rotation import NEAREST
+from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
@@ -1098,7 +1098,7 @@ class Robot(Displayable):
         frame: str | Sequence[str] | None = None,
         representation: str = "ZYZ",
         *,
-        nearest: float = NEAREST,
+        nearest: float = MIN_SINGULARITY_DISTANCE,
         base: BaseMotion | None = None,
         out: FloatArray | None = None,
         verify: Verify | None = None,

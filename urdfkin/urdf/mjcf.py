@@ -208,7 +208,7 @@ class Mjcf:
     def rule_scales(self, q: FloatArray) -> FloatArray:
         """Return a scale for each equality, shape (n, equalities); 0 if the equality is not a mimic rule.
 
-        The rounding error of a mimic rule is at most `MJCF_RULE_ROUNDINGS` * `EPS` * scale.
+        The rounding error of a mimic rule is at most `MJCF_MIMIC_ROUNDINGS` * `EPS` * scale.
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
         s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The scale is s(y) (k + 1), where k is the number of

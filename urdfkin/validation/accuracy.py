@@ -18,12 +18,12 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics.bodies import QUATERNION, analytical_jacobian
 from urdfkin.kinematics.rotation import (
     EULER_SEQUENCES,
-    NEAREST,
+    MIN_SINGULARITY_DISTANCE,
     euler_of,
     quaternion_of,
     singularity_distance,
 )
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
+from urdfkin.kinematics.roundings import EPS, SMALLEST_SUBNORMAL
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import Samples, draw_samples
 from urdfkin.model.recursion import Number
@@ -178,7 +178,7 @@ class _AccuracyBatch:
         plan, x = self.part.plan, self.part
         size, nearest = (
             compute_magnitudes(plan, x.q, None, None, x.state),
-            max(NEAREST, singularity_margin(plan)),
+            max(MIN_SINGULARITY_DISTANCE, singularity_margin(plan)),
         )
         jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
         R, R_pinocchio = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
@@ -236,7 +236,7 @@ def _make_line(quantity: str, reference: str | None, compared: Sequence[_Accurac
     errors_of_each: tuple[list[FloatArray], list[FloatArray]] = [], []
     for urdfkin_results, pinocchio_results, true, scale in compared:
         nonzero = scale > 0.0
-        units = np.maximum(EPS * scale[nonzero], LEAST_UNIT)
+        units = np.maximum(EPS * scale[nonzero], SMALLEST_SUBNORMAL)
         for errors, results in zip(errors_of_each, (urdfkin_results, pinocchio_results), strict=True):
             errors.append(_error_bound(results[nonzero], true[nonzero]) / units)
     own_errors, their_errors = map(np.concatenate, errors_of_each)

@@ -25,7 +25,7 @@ from typing import Annotated, Any, Literal, TypedDict
 import numpy as np
 
 from urdfkin.errors.escape import json_text, log_line
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
+from urdfkin.kinematics.roundings import EPS, SMALLEST_SUBNORMAL
 from urdfkin.model.configuration import coordinate_ranges, neutral
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
@@ -277,7 +277,7 @@ def _tolerance(k: float, scale: float) -> str:
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_DIGITS):
-        number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
+        number = +Decimal(k * max(EPS * scale, SMALLEST_SUBNORMAL))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())
 

@@ -605,7 +605,7 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     step, rate = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
     turns, size_of = plan.columns[:, ColumnField.IS_ROTATION] == 1, np.abs(plan.multipliers)
     for f, (_, frame) in enumerate(plan.frames):
-        on_path = np.flatnonzero(plan.sum_columns[f] >= 0)
+        on_path = np.flatnonzero(plan.target_columns[f] >= 0)
         i, j = on_path[:, np.newaxis], on_path[np.newaxis, :]
         before = step[j] <= step[i]
         sizes = product(size_of[i], size_of[j])
@@ -714,7 +714,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     if weights is None:
         weights = np.zeros((2, len(plan.frames), plan.nv))
         for f, (_, frame) in enumerate(plan.frames):
-            for c in np.flatnonzero(plan.sum_columns[f] >= 0):
+            for c in np.flatnonzero(plan.target_columns[f] >= 0):
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
@@ -753,7 +753,7 @@ def find_active_entries(
         else:
             levers = np.logical_or.accumulate([plan.lengths[len(turns) + f] > 0.0, *extends[path[:-1]]])
         has_lever = dict(zip(path, levers, strict=False))
-        for c in np.flatnonzero((plan.sum_columns[f] >= 0) & (plan.multipliers != 0.0)):
+        for c in np.flatnonzero((plan.target_columns[f] >= 0) & (plan.multipliers != 0.0)):
             column = plan.columns[c]
             rows = found[frame, :, column[ColumnField.V]]
             rows[:3] |= not column[ColumnField.IS_ROTATION] or has_lever[column[ColumnField.STEP]]

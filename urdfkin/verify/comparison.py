@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urdfkin.compiled import preload
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
+from urdfkin.kinematics.roundings import EPS, SMALLEST_SUBNORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import KERNELS, Bound, result_k
 
@@ -82,7 +82,7 @@ def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> Flo
     The difference of unequal numbers is inf if the scale is 0.
     The difference is also inf if a number or its scale is inf or NaN.
     """
-    unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
+    unit = np.where(scale > 0.0, np.maximum(EPS * scale, SMALLEST_SUBNORMAL), 0.0)
     difference = np.abs(ours - theirs)
     units = np.where(difference == 0.0, 0.0, difference / unit)
     return np.where(np.isfinite(difference) & np.isfinite(scale), units, np.inf)

@@ -33,11 +33,11 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
 from urdfkin.kinematics.roundings import (
     EPS,
-    LEAST_UNIT,
     ROW_ROUNDINGS,
+    SMALLEST_SUBNORMAL,
     joint_roundings,
-    read_back_roundings,
     table_roundings,
+    written_urdf_roundings,
 )
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.chain import FrameChain, make_chain
@@ -101,7 +101,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
     slides = values[:, [not joint.kind.turns for joint in path.joints]]
     length += np.abs(slides).sum(axis=-1).max(initial=0.0)
-    share = max(metres / (unit * length + LEAST_UNIT), turned / unit)
+    share = max(metres / (unit * length + SMALLEST_SUBNORMAL), turned / unit)
     if share > 1.0:
         raise TableError(
             "the chain's axes disagree with Pinocchio's",
@@ -140,7 +140,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (joint_roundings(joints) + size) + sum_zeroed_tilts(path)
     allowed = screws.rounding(coordinates) + unit * (lever + size)
-    share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
+    share = float((off[..., 3].max(axis=-1) / (allowed + SMALLEST_SUBNORMAL)).max(initial=0.0))
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
     if not max(share, turn) <= 1.0:
         raise TableError(
@@ -277,8 +277,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     # The URDF contains exact rotations.
     # The bound therefore includes the deviation of the table's matrices from rotation matrices.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
-    turn = EPS * read_back_roundings(rows) + defect
-    allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
+    turn = EPS * written_urdf_roundings(rows) + defect
+    allowed = metres * (written_urdf_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
     if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
         raise TableError(
             "the URDF made from a table differs from the table",

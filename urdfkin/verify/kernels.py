@@ -28,7 +28,7 @@ from urdfkin.compiled.machine.memory import doubles_at, prefetch
 from urdfkin.compiled.plan import JointMotion
 from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bind_equations, rebind_functions
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMAL
 
 _INFINITY_BITS = 0x7FF0000000000000
 _MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
@@ -56,7 +56,7 @@ def _is_difference_finite(x, y, i):
 @inline_function(fastmath={"nnan", "nsz"})
 def _in_eps_scale(difference, size):
     must_be_equal = math.inf if difference > 0.0 else 0.0
-    return difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
+    return difference / max(EPS * size, SMALLEST_SUBNORMAL) if size > 0.0 else must_be_equal
 
 
 @inline_function(fastmath={"nnan", "nsz"})
@@ -145,7 +145,7 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
         for k in range(len(scale)):
             for j in range(numbers):
                 size = scale[k, j]
-                unit[k * numbers + j] = max(EPS * size, LEAST_UNIT) if size > 0.0 else 0.0
+                unit[k * numbers + j] = max(EPS * size, SMALLEST_SUBNORMAL) if size > 0.0 else 0.0
     for i in range(len(out)):
         k = i % len(scale)
         if in_triples:

@@ -24,7 +24,7 @@ import numpy as np
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
 from urdfkin.errors.escape import escape_unprintable
-from urdfkin.kinematics.roundings import EPS, MJCF_RULE_ROUNDINGS
+from urdfkin.kinematics.roundings import EPS, MJCF_MIMIC_ROUNDINGS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, LinkFrame
 from urdfkin.system.files import expand_home
@@ -168,7 +168,7 @@ def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     columns = sorted(rules)
     residuals, sizes = residuals[:, columns], sizes[:, columns]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.abs(residuals) / (MJCF_RULE_ROUNDINGS * EPS * sizes)
+        share = np.abs(residuals) / (MJCF_MIMIC_ROUNDINGS * EPS * sizes)
     share = np.where(residuals == 0.0, 0.0, share)
     if not (share <= 1.0).all():
         k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)

@@ -18,9 +18,9 @@ from urdfkin.kinematics.bodies import (
     planar_rotation,
     planar_rotation_derivative,
     point_acceleration,
+    pose_rate_inverse,
+    pose_rate_matrix,
     pose_rates,
-    representation_inverse,
-    representation_matrix,
     tool_velocity,
     velocity_jacobian,
     velocity_of_pose_rates,
@@ -122,7 +122,7 @@ def test_manipulator_jacobian_and_velocity_jacobian_can_be_converted_both_ways(r
 def test_the_representation_matrix_of_a_quaternion_has_a_right_inverse_at_every_angle() -> None:
     for angle in (0.0, 1e-9, 1.0, np.pi):
         turned = exp_rotation([0.0, angle, 0.0])
-        product = representation_matrix("quaternion", turned) @ representation_inverse("quaternion", turned)
+        product = pose_rate_matrix("quaternion", turned) @ pose_rate_inverse("quaternion", turned)
         assert np.abs(product - np.eye(6)).max() <= ROUNDING
     assert np.abs(rotation_from_quaternion(orientation_of("quaternion", R)) - R).max() <= ROUNDING
 

@@ -33,7 +33,7 @@ from urdfkin.system.cache import read_cached_file, report_damaged, write_cached_
 from urdfkin.system.files import read_bytes
 
 _NullCache: Any = NullCache  # Numba has no type annotations.
-_Result: Any = CompileResult
+_CompileResult: Any = CompileResult
 _dumps: Any = dumps
 
 
@@ -44,8 +44,8 @@ class KernelCache(_NullCache):  # type: ignore[misc]
     on those of `compiled` and `kinematics`.
     """
 
-    def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
-        self._folder, self._name, self._begin = folder, function_name(function), begin
+    def __init__(self, function: Callable[..., int], folder: Path, report_start: Callable[[], None]) -> None:
+        self._folder, self._name, self._report_start = folder, function_name(function), report_start
         self._source = read_bytes(Path(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -53,12 +53,12 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         path = self._path(sig, target_context.codegen())
         if (content := read_cached_file(path)) is not None:
             try:
-                return _Result._rebuild(target_context, *pickle.loads(content))
+                return _CompileResult._rebuild(target_context, *pickle.loads(content))
             # The file's checksum is correct, but another version of Numba may have written the file.
             # Reading a file from another version can raise any exception.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")
-        self._begin()
+        self._report_start()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
@@ -76,14 +76,14 @@ def function_name(function: Callable[..., int]) -> str:
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
-_Library: Any = JITCodeLibrary  # Numba has no type annotations.
+_CodeLibrary: Any = JITCodeLibrary  # Numba has no type annotations.
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = CompilerBase
-_Passes: Any = PassManager
-_register: Any = register_pass
+_PassManager: Any = PassManager
+_register_pass: Any = register_pass
 
 
-class _InlinedLibrary(_Library):  # type: ignore[misc]
+class _InlinedLibrary(_CodeLibrary):  # type: ignore[misc]
     def finalize(self) -> None:
         """Complete the library without machine code."""
         self._finalize_dynamic_globals()
@@ -94,7 +94,7 @@ class _InlinedLibrary(_Library):  # type: ignore[misc]
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
-@_register(mutates_CFG=True, analysis_only=False)
+@_register_pass(mutates_CFG=True, analysis_only=False)
 class _InlinedLowering(_Lowering):  # type: ignore[misc]
     _name = "inlined_lowering"
 
@@ -120,7 +120,7 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
     """
 
     def define_pipelines(self) -> list[Any]:
-        passes = _Passes("inlined")
+        passes = _PassManager("inlined")
         for each in (
             untyped_passes.TranslateByteCode,
             untyped_passes.FixupArgs,
@@ -148,8 +148,8 @@ _config: Any = numba.config  # Numba defines these settings at run time.
 #: Division by zero gives inf, as in C.
 #: Loops therefore contain no branch that raises an error.
 #: The functions allocate no memory, so arrays need no reference counts.
-COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-_INLINED: dict[str, Any] = {
+COMPILE_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_INLINE_OPTIONS: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
@@ -158,7 +158,7 @@ _INLINED: dict[str, Any] = {
 
 
 @contextmanager
-def compiling_allowed() -> Iterator[None]:
+def ignore_disable_jit() -> Iterator[None]:
     """Ignore NUMBA_DISABLE_JIT in a `with` block.
 
     Python cannot run these functions uncompiled.
@@ -185,13 +185,13 @@ def _skip_blas_check() -> None:
 
 def jit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
-        with compiling_allowed():
-            return numba.njit(**options, **COMPILED)(function)
+        with ignore_disable_jit():
+            return numba.njit(**options, **COMPILE_OPTIONS)(function)
 
     return decorate
 
 
-inline = jit(**_INLINED)
+inline = jit(**_INLINE_OPTIONS)
 
 # A read-only argument type also accepts a writable array, without a copy.
 FLOATS_1D = types.Array(types.float64, 1, "C", readonly=True)
@@ -229,12 +229,12 @@ class Kernel:
         return dispatcher
 
     def _compile_or_load(self, function: Any, compile_: Callable[[], object]) -> None:
-        with compile_event(self.__name__.strip("_").replace("_", " ")) as begin, compiling_allowed():
+        with compile_event(self.__name__.strip("_").replace("_", " ")) as report_start, ignore_disable_jit():
             _skip_blas_check()
             if (folder := kernel_cache_folder()) is None:
-                begin()
+                report_start()
             else:
-                function._cache = KernelCache(self._function, folder, begin)
+                function._cache = KernelCache(self._function, folder, report_start)
             compile_()
 
     def __call__(self, *arguments: Any) -> int:
@@ -251,7 +251,7 @@ class CKernel(Kernel):
         super().__init__(function, (types.int64,) * function.__code__.co_argcount)
 
     def _compile(self) -> Any:
-        c_function: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
+        c_function: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILE_OPTIONS)
         self._compile_or_load(c_function, c_function.compile)
         return c_function
 
@@ -264,7 +264,7 @@ class CKernel(Kernel):
 
 
 def inline_function(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    return jit(**_INLINED, **options)
+    return jit(**_INLINE_OPTIONS, **options)
 
 
 def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:

@@ -14,11 +14,13 @@ from urdfkin.compiled.machine.compiling import CKernel, inline
 from urdfkin.kinematics.arithmetic import rebind_functions
 
 #: Compiled objects that replace Python objects of the same name.
-_OTHERS = {
+_REPLACEMENTS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
-_INLINED: dict[str, Any] = rebind_functions(recursion, outputs, decorate=inline, replacements=_OTHERS)
-_KERNELS: dict[str, CKernel] = rebind_functions(recursions, decorate=CKernel, replacements=_INLINED)
+_INLINED_FUNCTIONS: dict[str, Any] = rebind_functions(
+    recursion, outputs, decorate=inline, replacements=_REPLACEMENTS
+)
+_KERNELS: dict[str, CKernel] = rebind_functions(recursions, decorate=CKernel, replacements=_INLINED_FUNCTIONS)
 
 placements, velocities, accelerations = (
     _KERNELS[name] for name in ("placements", "velocities", "accelerations")

@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 from urdfkin.compiled.machine.compiling import inline
 from urdfkin.compiled.machine.numbers import UNUSED, ConstantNumber, Lanes, as_number, build_broadcast
 from urdfkin.compiled.plan import LANES
-from urdfkin.compiled.python_numbers import LARGE
+from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
 
 LANES_TYPE = Lanes(LANES)
 DOUBLES, INTEGERS = types.CPointer(types.float64), types.CPointer(types.int64)
@@ -29,12 +29,12 @@ def _vector_pointer(builder: Any, numbers: Any, at: Any, width: int) -> Any:
     return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
 
 
-def _row_pointer(builder: Any, s: Any, row: Any) -> Any:
-    return _vector_pointer(builder, s, builder.mul(row, ir.Constant(row.type, LANES)), LANES)
+def _row_pointer(builder: Any, scratch: Any, row: Any) -> Any:
+    return _vector_pointer(builder, scratch, builder.mul(row, ir.Constant(row.type, LANES)), LANES)
 
 
 @intrinsic
-def load_number(context: Any, s: Any, row: Any) -> Any:
+def load_number(context: Any, scratch: Any, row: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.load(_row_pointer(builder, *arguments), align=64)
 
@@ -42,7 +42,7 @@ def load_number(context: Any, s: Any, row: Any) -> Any:
 
 
 @intrinsic
-def load_number_if(context: Any, marker: Any, s: Any, row: Any) -> Any:
+def load_number_if(context: Any, marker: Any, scratch: Any, row: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(marker, ConstantNumber):
             return context.get_dummy_value()
@@ -54,19 +54,19 @@ def load_number_if(context: Any, marker: Any, s: Any, row: Any) -> Any:
 
 
 @intrinsic
-def store_number(context: Any, s: Any, row: Any, x: Any) -> Any:
+def store_number(context: Any, scratch: Any, row: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        s, row, value = arguments
+        scratch, row, value = arguments
         if x != UNUSED:
             vector = as_number(context, builder, x, value, LANES)
-            builder.store(vector, _row_pointer(builder, s, row), align=64)
+            builder.store(vector, _row_pointer(builder, scratch, row), align=64)
         return context.get_dummy_value()
 
     return types.void(DOUBLES, types.intp, x), generate
 
 
 @intrinsic
-def load_constant(context: Any, g: Any, i: Any) -> Any:
+def load_constant(context: Any, constants: Any, i: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return build_broadcast(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
 
@@ -157,16 +157,18 @@ def _make_reader(width: int) -> Any:
     """Make a function that reads `width` numbers per configuration."""
 
     @intrinsic
-    def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
+    def read(context: Any, x: Any, at: Any, stride: Any, scratch: Any, row: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            x, at, stride, s, row = arguments
+            x, at, stride, scratch, row = arguments
             pieces = []
             for _ in range(LANES):
                 pieces.append(builder.load(_vector_pointer(builder, x, at, width), align=8))
                 at = builder.add(at, stride)
             rows = _transpose_blocks(builder, [_concatenate(builder, pieces[i::width]) for i in range(width)])
             for i, vector in enumerate(rows):
-                builder.store(vector, _row_pointer(builder, s, _add_constant(builder, row, i)), align=64)
+                builder.store(
+                    vector, _row_pointer(builder, scratch, _add_constant(builder, row, i)), align=64
+                )
             return context.get_dummy_value()
 
         return types.void(DOUBLES, *[types.intp] * 2, DOUBLES, types.intp), generate
@@ -178,13 +180,13 @@ def _make_writer(width: int) -> Any:
     """Make a function that writes `width` numbers per configuration."""
 
     @intrinsic
-    def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
+    def write(context: Any, scratch: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            s, rows, first, to, at, stride = arguments
+            scratch, rows, first, to, at, stride = arguments
             vectors = []
             for i in range(width):
                 row = builder.load(builder.gep(rows, [_add_constant(builder, first, i)]))
-                vectors.append(builder.load(_row_pointer(builder, s, row), align=64))
+                vectors.append(builder.load(_row_pointer(builder, scratch, row), align=64))
             blocks = _transpose_blocks(builder, vectors)
             for k in range(LANES):
                 numbers = _slice_vector(builder, blocks[k % width], k // width * width, width)
@@ -202,7 +204,7 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 
 @inline
-def read_rows(m, x, at, stride, count, s, row):
+def read_rows(m, x, at, stride, count, scratch, row):
     """Read `count` numbers per configuration into scratch rows.
 
     The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, one configuration fills all
@@ -211,23 +213,23 @@ def read_rows(m, x, at, stride, count, s, row):
     i = 0
     if m == 1:
         for i in range(count):
-            store_number(s, row + i, broadcast(x[at + i]))
+            store_number(scratch, row + i, broadcast(x[at + i]))
     else:
         while i + 8 <= count:
-            _read_8(x, at + i, stride, s, row + i)
+            _read_8(x, at + i, stride, scratch, row + i)
             i += 8
         if count & 4:
-            _read_4(x, at + i, stride, s, row + i)
+            _read_4(x, at + i, stride, scratch, row + i)
             i += 4
         if count & 2:
-            _read_2(x, at + i, stride, s, row + i)
+            _read_2(x, at + i, stride, scratch, row + i)
             i += 2
         if count & 1:
-            _read_1(x, at + i, stride, s, row + i)
+            _read_1(x, at + i, stride, scratch, row + i)
 
 
 @inline
-def write_rows(m, s, rows, first, count, to, at, stride):
+def write_rows(m, scratch, rows, first, count, to, at, stride):
     """Copy `count` scratch rows to the array `to`.
 
     If `m` is 1, only one configuration is copied.
@@ -235,19 +237,19 @@ def write_rows(m, s, rows, first, count, to, at, stride):
     i = 0
     if m == 1:
         for i in range(count):
-            to[at + i] = s[rows[first + i] * LANES]
+            to[at + i] = scratch[rows[first + i] * LANES]
     else:
         while i + 8 <= count:
-            _write_8(s, rows, first + i, to, at + i, stride)
+            _write_8(scratch, rows, first + i, to, at + i, stride)
             i += 8
         if count & 4:
-            _write_4(s, rows, first + i, to, at + i, stride)
+            _write_4(scratch, rows, first + i, to, at + i, stride)
             i += 4
         if count & 2:
-            _write_2(s, rows, first + i, to, at + i, stride)
+            _write_2(scratch, rows, first + i, to, at + i, stride)
             i += 2
         if count & 1:
-            _write_1(s, rows, first + i, to, at + i, stride)
+            _write_1(scratch, rows, first + i, to, at + i, stride)
 
 
 @intrinsic
@@ -305,7 +307,7 @@ def add_squares(total, x, at, count):
 
         sum of squares <= sum of lanes <= 8 * sum of squares
 
-    `is_in_range` compares the sum of lanes with LARGE^2.
+    `is_in_range` compares the sum of lanes with NO_OVERFLOW_BOUND^2.
     """
     # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
@@ -336,11 +338,11 @@ def _sum_lanes(context: Any, x: Any) -> Any:
 
 @inline
 def is_in_range(total):
-    return _sum_lanes(total) < LARGE * LARGE
+    return _sum_lanes(total) < NO_OVERFLOW_BOUND * NO_OVERFLOW_BOUND
 
 
 @intrinsic
-def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
+def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
     """Copy eight numbers, bypassing the caches.
 
     `to[at]` must begin a cache line.
@@ -367,7 +369,7 @@ def stream(x, count, to, at, address):
     for i in range(edge):
         to[at + i] = x[i]
     for i in range(edge, lines, LANES):
-        _stream_8(x, i, to, at + i)
+        _stream_eight(x, i, to, at + i)
     for i in range(lines, count):
         to[at + i] = x[i]
 

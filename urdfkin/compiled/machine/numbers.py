@@ -139,7 +139,7 @@ def _are_supported(*kinds: Any) -> bool:
     )
 
 
-def _times(x: Any, y: Any) -> Any:
+def _product_type(x: Any, y: Any) -> Any:
     if _is_constant(x, None) or _is_constant(y, None):
         return UNUSED
     if _is_constant(x, 0) or _is_constant(y, 0):
@@ -151,7 +151,7 @@ def _times(x: Any, y: Any) -> Any:
     return Product(_width(x, y) or 1)
 
 
-def _sum(x: Any, y: Any) -> Any:
+def _sum_type(x: Any, y: Any) -> Any:
     if _is_constant(x, None) or _is_constant(y, None):
         return UNUSED
     if _is_constant(y, 0):
@@ -162,19 +162,19 @@ def _sum(x: Any, y: Any) -> Any:
     return None if width is None else Lanes(width)
 
 
-def _difference(x: Any, y: Any) -> Any:
-    return _negative(y) if _is_constant(x, 0) and not _is_constant(y, None) else _sum(x, y)
+def _difference_type(x: Any, y: Any) -> Any:
+    return _negative_type(y) if _is_constant(x, 0) and not _is_constant(y, None) else _sum_type(x, y)
 
 
-def _negative(x: Any) -> Any:
+def _negative_type(x: Any) -> Any:
     return None if _is_constant(x, 1) else x
 
 
-_RESULTS: dict[Any, Callable[..., Any]] = {
-    operator.mul: _times,
-    operator.add: _sum,
-    operator.sub: _difference,
-    operator.neg: _negative,
+_RESULT_TYPES: dict[Any, Callable[..., Any]] = {
+    operator.mul: _product_type,
+    operator.add: _sum_type,
+    operator.sub: _difference_type,
+    operator.neg: _negative_type,
 }
 
 
@@ -188,22 +188,22 @@ def _register_types(operation: Any, result: Callable[..., Any]) -> None:
             return None if kind is None else signature(kind, *args)
 
 
-for _operation, _result in _RESULTS.items():
+for _operation, _result in _RESULT_TYPES.items():
     _register_types(_operation, _result)
 
 
-def _values(context: Any, builder: Any, signature: Any, arguments: Any) -> list[_Value]:
+def _wrap_values(context: Any, builder: Any, signature: Any, arguments: Any) -> list[_Value]:
     return [_Value(context, builder, *pair) for pair in zip(signature.args, arguments, strict=True)]
 
 
-def _product(context: Any, builder: Any, kind: Product, x: Any, y: Any) -> Any:
+def _build_product(context: Any, builder: Any, kind: Product, x: Any, y: Any) -> Any:
     pair = cgutils.create_struct_proxy(kind)(context, builder)
     pair.x, pair.y = x, y
     return pair._getvalue()
 
 
 def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    x, y = _values(context, builder, signature, arguments)
+    x, y = _wrap_values(context, builder, signature, arguments)
     kind = signature.return_type
     if isinstance(kind, ConstantNumber):
         return context.get_dummy_value()
@@ -211,7 +211,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
         return y.value
     if isinstance(y.type, ConstantNumber):
         return x.value
-    return _product(context, builder, kind, x.number(kind.width), y.number(kind.width))
+    return _build_product(context, builder, kind, x.number(kind.width), y.number(kind.width))
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
@@ -227,7 +227,7 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
         return context.get_dummy_value()
     if x.is_product:
         first, second = x.factors()
-        return _product(context, builder, x.type, builder.fneg(first), second)
+        return _build_product(context, builder, x.type, builder.fneg(first), second)
     return builder.fneg(x.value)
 
 
@@ -238,7 +238,7 @@ def _lower_sum(*, negative: bool) -> Callable[..., Any]:
         def apply_sign(value: Any) -> Any:
             return builder.fneg(value) if negative else value
 
-        x, y = _values(context, builder, signature, arguments)
+        x, y = _wrap_values(context, builder, signature, arguments)
         if _is_constant(signature.return_type, None):
             return context.get_dummy_value()
         if _is_constant(y.type, 0):
@@ -257,13 +257,13 @@ def _lower_sum(*, negative: bool) -> Callable[..., Any]:
 
 
 def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    (x,) = _values(context, builder, signature, arguments)
+    (x,) = _wrap_values(context, builder, signature, arguments)
     return _negate(context, builder, x)
 
 
-_KINDS = (Lanes, Product, ConstantNumber, types.Integer)
-for _x in _KINDS:
-    for _y in _KINDS:
+_OPERAND_TYPES = (Lanes, Product, ConstantNumber, types.Integer)
+for _x in _OPERAND_TYPES:
+    for _y in _OPERAND_TYPES:
         if _x is _y is types.Integer:
             continue
         lower_builtin(operator.mul, _x, _y)(_lower_mul)

@@ -28,24 +28,24 @@ from urdfkin.compiled.machine.compiling import inline
 from urdfkin.compiled.machine.memory import store_number
 from urdfkin.compiled.machine.numbers import build_fma
 from urdfkin.compiled.plan import LANES
-from urdfkin.compiled.python_numbers import COSINE, LARGEST_ANGLE, NO_FRACTION, PI_2, PI_2_REST, SINE
+from urdfkin.compiled.python_numbers import COSINE, LARGEST_ANGLE, PI_2, PI_2_REST, ROUNDING_SHIFT, SINE
 
-_2_PI = 2.0 / math.pi
+_TWO_OVER_PI = 2.0 / math.pi
 
 
 @inline
-def sine_cosine(s, row, x):
+def sine_cosine(scratch, row, x):
     """Return sines and cosines of angles.
 
     If an angle is nan or large, the function writes the angles to scratch row `row`.
     """
     sine, cosine = _small_sine_cosine(x)
     if _any_large(x):
-        store_number(s, row, x)
+        store_number(scratch, row, x)
         for k in range(row * LANES, (row + 1) * LANES):
-            if not abs(s[k]) < LARGEST_ANGLE:
-                sine = _insert_lane(sine, k - row * LANES, math.sin(s[k]))
-                cosine = _insert_lane(cosine, k - row * LANES, math.cos(s[k]))
+            if not abs(scratch[k]) < LARGEST_ANGLE:
+                sine = _insert_lane(sine, k - row * LANES, math.sin(scratch[k]))
+                cosine = _insert_lane(cosine, k - row * LANES, math.cos(scratch[k]))
     return sine, cosine
 
 
@@ -70,9 +70,9 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
                 value = build_fma(builder, z, value, all_lanes(coefficient))
             return value
 
-        shifted = build_fma(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
+        shifted = build_fma(builder, x, all_lanes(_TWO_OVER_PI), all_lanes(ROUNDING_SHIFT))
         quarters = builder.bitcast(shifted, whole)
-        n = builder.fsub(shifted, all_lanes(NO_FRACTION))
+        n = builder.fsub(shifted, all_lanes(ROUNDING_SHIFT))
         # Let d be the double nearest to pi/2.
         # If n != 0, x and n d are multiples of 2^-53.
         # |x - n d| is below 1, so this difference is exact.

@@ -90,8 +90,8 @@ def _call(context: Any, address: Any, argument: Any) -> Any:
 
 
 @intrinsic
-def _test_and_set(context: Any, numbers: Any, place: Any) -> Any:
-    """Atomically replace `numbers[place]` by 1.
+def _test_and_set(context: Any, numbers: Any, index: Any) -> Any:
+    """Atomically replace `numbers[index]` by 1.
 
     Returns:
         The previous value.
@@ -105,7 +105,7 @@ def _test_and_set(context: Any, numbers: Any, place: Any) -> Any:
 
 
 @intrinsic
-def _release(context: Any, numbers: Any, place: Any) -> Any:
+def _clear_flag(context: Any, numbers: Any, index: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         nil = ir.Constant(ir.IntType(64), 0)
         builder.store_atomic(nil, builder.gep(arguments[0], [arguments[1]]), "release", 8)
@@ -190,7 +190,7 @@ def _compute_into(address, inputs, to, ndarray):
     args[_OUT] = out
     valid = _call(args[_KERNEL], address) == 0
     args[_COUNT] += valid
-    _release(args, _BUSY)
+    _clear_flag(args, _BUSY)
     return valid
 
 
@@ -204,7 +204,9 @@ class _Method(ctypes.Structure):
 
 
 _FASTCALL = 0x80
-_FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.py_object, ctypes.c_void_p)
+_BUILTIN_CONSTRUCTOR = ctypes.PYFUNCTYPE(
+    ctypes.py_object, ctypes.POINTER(_Method), ctypes.py_object, ctypes.c_void_p
+)
 
 
 def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
@@ -213,7 +215,7 @@ def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., Floa
     The function keeps `bound` alive.
     """
     method = _Method(name.encode(), address, _FASTCALL, None)
-    new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
+    new = _BUILTIN_CONSTRUCTOR(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
     return function
 

@@ -27,7 +27,7 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable, joint_transform, link_transform
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
-from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, fit_roundings
+from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, fitted_table_roundings
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, pose
@@ -332,7 +332,7 @@ def fit_model(
         return metres + targets.scale * radians
 
     best, best_size = written, size(written)
-    if best_size <= EPS * fit_roundings(0) * targets.scale:
+    if best_size <= EPS * fitted_table_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, *(FAST_SEARCH if fast else ()))):
         # A fit minimizes squared errors, but `size` is the largest error.

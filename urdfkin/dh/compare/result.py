@@ -14,7 +14,7 @@ from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
-from urdfkin.kinematics.roundings import EPS, fit_roundings
+from urdfkin.kinematics.roundings import EPS, fitted_table_roundings
 from urdfkin.model.configuration import ASSUMED_LIMIT
 from urdfkin.model.tree import Limit, is_bounded
 
@@ -189,7 +189,7 @@ class TableComparison:
 
         Unit: rad, or m per m of reach.
         """
-        return EPS * fit_roundings(len(self.reference.rows))
+        return EPS * fitted_table_roundings(len(self.reference.rows))
 
     @property
     def rounding_metres(self) -> float:

@@ -58,7 +58,7 @@ from urdfkin.kinematics.rotation import (
     rotation_from_quaternion,
     rotation_with_z_axis,
 )
-from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS, EPS, FILE_ROUNDINGS
+from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS, EPS, FILE_ANGLE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
@@ -411,7 +411,7 @@ class Mechanism:
         The error includes the angles between Pinocchio's and the URDF's axes.
         """
         joints = max(self.depths) + 1
-        return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
+        return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ANGLE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
             j.pinocchio_tilt for j in self.tree.joints
         )
 
