@@ -38,7 +38,7 @@ import numpy as np
 import urdfkin
 from scripts.benchmarking.contenders import find_indices
 from scripts.pages import table as markdown
-from urdfkin.export import QUANTITIES, write
+from urdfkin.export import DEFAULT_QUANTITIES, write
 from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import make_robot_code
 from urdfkin.export.function import Function
@@ -200,7 +200,7 @@ def main(words: list[str] | None = None) -> int:
         )
     robot = urdfkin.load(options.robot)
     frame = options.frame or robot.tip_frame
-    code = make_robot_code(robot, frame, QUANTITIES, "local_world_aligned")
+    code = make_robot_code(robot, frame, DEFAULT_QUANTITIES, "local_world_aligned")
     with tempfile.TemporaryDirectory() as folder:
         try:
             programs = compile_programs(code, Path(folder), compiler)

@@ -38,7 +38,7 @@ from typing import Any
 import urdfkin
 from scripts.benchmarking.workload import chain_urdf
 from scripts.pages import DOCS, insert_parts, table
-from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
+from urdfkin.export import DEFAULT_QUANTITIES, LANGUAGES, code_for_language, write
 from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import make_robot_code
 from urdfkin.robot import Robot
@@ -59,7 +59,7 @@ _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 
 
-def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
+def make_code(robot: Robot, frame: str, quantities: Sequence[str] = DEFAULT_QUANTITIES) -> FrameCode:
     return make_robot_code(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
@@ -82,7 +82,7 @@ def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> I
                 yield f"{compiler} {real}", _largest_ratio(ratios, len(code.functions))
     for to in sorted({"numpy", "array", "sympy-exact"} & set(languages)):
         scope: dict[str, Any] = {"__name__": "robot"}
-        language_code = code_in(code, to)
+        language_code = code_for_language(code, to)
         if not language_code.proof.certificate.verified:
             yield f"{to} unverified", float("nan")
         exec(compile(write(language_code, to), "robot.py", "exec"), scope)
@@ -114,7 +114,7 @@ def leaf_frames(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 def check_frame(robot: Robot, frame: str, languages: Collection[str]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
-        code = make_code(robot, frame, QUANTITIES if robot.nv else ("placement",))
+        code = make_code(robot, frame, DEFAULT_QUANTITIES if robot.nv else ("placement",))
         ratios = dict(error_ratios(code, Path(folder), languages))
     good = all(share <= 1.0 for share in ratios.values()) and code.proof.certificate.verified
     return {"good": good, **ratios}
@@ -197,7 +197,7 @@ def print_worst_errors(lines: Sequence[dict[str, Any]]) -> None:
 def make_page(text: str) -> str:
     rows = []
     frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
-    for (source, frame), quantity in product(frames, QUANTITIES):
+    for (source, frame), quantity in product(frames, DEFAULT_QUANTITIES):
         robot = urdfkin.load(source)
         code = make_code(robot, frame, (quantity,))
         lines = write(code, "c").partition("#ifdef " + code.name.upper() + "_MAIN")[0]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
+from urdfkin.view.figure import BLUE, GREEN, VERMILION, figure_bytes, new_figure, style
 
 #: Colour, hatch and legend for each prefix of a contender's name.
 KINDS = {
@@ -36,7 +36,9 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
         _draw_growth(
             figure.add_subplot(grid[2, 1]), rows, "sizes", "configurations in a batch", "configuration"
         )
-        return _shrink_svg(save(figure, path)) if path.suffix == ".svg" else save(figure, path)
+        return (
+            _shrink_svg(figure_bytes(figure, path)) if path.suffix == ".svg" else figure_bytes(figure, path)
+        )
 
 
 def _shrink_svg(svg: bytes) -> bytes:

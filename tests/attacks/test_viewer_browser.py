@@ -138,10 +138,10 @@ def test_no_name_becomes_an_element_or_a_script_in_any_panel(viewer: Viewer, bro
     # An error message with a name
     viewer.frame.value = "base"
     viewer.dh.value = "standard"
-    viewer._choose()
+    viewer._update_dh_table()
     assert browser.js("return document.querySelectorAll('#hacked, iframe').length") == 0
     viewer.dh.value, viewer.frame.value = "standard", NAMES["script"]
-    viewer._choose()
+    viewer._update_dh_table()
     browser.chrome.get(viewer.server.address)
     browser.wait_for(f"base to {NAMES['script']}")
 

@@ -145,7 +145,7 @@ def test_a_viser_version_that_starts_a_server_differently_is_refused(monkeypatch
 def test_a_server_without_the_request_filter_or_with_other_scripts_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "_SCRIPTS", (("<script data-other=", "{nonce}"),))
+    monkeypatch.setattr(module, "_NONCE_REPLACEMENTS", (("<script data-other=", "{nonce}"),))
     with pytest.raises(UnguardedError, match="the page of viser has unexpected scripts"):
         new_server(port=free_port())
     monkeypatch.undo()

@@ -14,7 +14,7 @@ from urdfkin.kinematics.rotation import rotation_from_quaternion
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory, read_trajectory
-from urdfkin.view.plot import caption
+from urdfkin.view.plot import check_summary
 
 T = np.linspace(0.0, 4.0, 81)
 
@@ -122,7 +122,7 @@ def test_a_quaternion_that_changes_its_sign_is_the_same_orientation(tmp_path: Pa
 def test_a_plot_verifies_the_formula_and_not_the_rates(tmp_path: Path) -> None:
     robot = wheel()
     motion = read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
-    words = caption(frame_motion(robot, motion, "b"), motion)
+    words = check_summary(frame_motion(robot, motion, "b"), motion)
     assert "verified by Pinocchio" in words
     assert "not whether v and a are the derivatives of q" in words
 

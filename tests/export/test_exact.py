@@ -29,7 +29,7 @@ from tests.reading import present
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
 from urdfkin.export.c import fill_template
-from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, evaluate_intervals, format_literal
+from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, evaluate_intervals, format_exact_literal
 from urdfkin.export.expression import Graph, Node, find_dependencies
 from urdfkin.export.proof import format_decimal
 from urdfkin.kinematics import roundings
@@ -157,7 +157,7 @@ def test_a_difference_between_exact_expressions_and_pinocchio_is_an_error_of_the
 def test_a_double_cannot_enter_an_exact_expression() -> None:
     graph = ExactGraph()
     x = graph.make_input("q", 0)
-    assert format_literal(Fraction(17, 40)) == "Rational(17, 40)"
+    assert format_exact_literal(Fraction(17, 40)) == "Rational(17, 40)"
     with pytest.raises(TypeError, match="is a double"):
         _ = 0.5 * x
 
@@ -170,7 +170,7 @@ def test_a_double_cannot_enter_an_exact_expression() -> None:
     ],
 )  # fmt: skip
 def test_an_angle_is_a_multiple_of_pi_if_its_double_is_the_nearest_one(decimals: str, text: str) -> None:
-    assert format_literal(ExactGraph().angle(Fraction(decimals))) == text
+    assert format_exact_literal(ExactGraph().exact_angle(Fraction(decimals))) == text
 
 
 def test_sines_and_roots_that_are_fractions_are_constants() -> None:

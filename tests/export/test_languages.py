@@ -27,7 +27,7 @@ from tests.urdfs import joint, limit, mimic
 from urdfkin.cli.export import _LANGUAGES_OF_SUFFIXES
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
-from urdfkin.export.check import _COMPILE, check
+from urdfkin.export.check import _COMPILE_COMMANDS, check
 from urdfkin.export.proof import format_decimal
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
@@ -567,7 +567,7 @@ def test_the_check_refuses_a_file_that_urdfkin_export_did_not_write(tmp_path: Pa
 @pytest.mark.slow
 def test_the_check_accepts_each_suffix_that_selects_a_compiled_language(tmp_path: Path) -> None:
     suffixes = {suffix for suffix, to in _LANGUAGES_OF_SUFFIXES.items() if to in ("cpp", "cuda")}
-    assert suffixes | {".c"} == set(_COMPILE)
+    assert suffixes | {".c"} == set(_COMPILE_COMMANDS)
     for suffix in (".cc", ".cu"):
         path = tmp_path / f"arm{suffix}"
         good("export", "planar_two_link", "--quantity", "placement", "-o", str(path))

@@ -17,7 +17,7 @@ from urdfkin.compiled.machine.single import make_single_evaluator
 from urdfkin.compiled.plan import REFERENCES as IN_KERNELS
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.export.function import make_function
-from urdfkin.export.recursion import QUANTITIES as EXPORTED
+from urdfkin.export.recursion import QUANTITY_FUNCTIONS as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION
 from urdfkin.kinematics.rotation import EULER_SEQUENCES
 from urdfkin.model.base_motion import FIXED_BASE_STATE

@@ -228,7 +228,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = dict[bool, dict[str, Any]]()
     with pytest.MonkeyPatch.context() as patch:
         # There are two different robots. Drawing one of them 2,000 times would take minutes.
-        patch.setattr(html, "MOST", 100_000)
+        patch.setattr(html, "MAX_PAGE_CHARACTERS", 100_000)
         right = html._robot
 
         def once(robot: ReportedRobot, index: int, whole: Document) -> dict[str, Any]:

@@ -178,7 +178,7 @@ def test_the_markdown_begins_with_regressions_and_counts_the_omitted_changes() -
     same = compare(arms(), arms())
     assert markdown_of(arms(), arms(), same).startswith("## ✅ No regression, 0 changes\n")
     assert "❌ regression" in lines[lines.index("| --- | --- | --- | --- |") + 1]
-    assert len(markdown_of(arms(), failing(), found, limit=900)) <= 900
+    assert len(markdown_of(arms(), failing(), found, max_characters=900)) <= 900
     old: Any = arms()
     new = copy.deepcopy(old)
     for check in new["robots"][0]["checks"]:

@@ -94,7 +94,7 @@ def test_a_terminal_shows_the_latest_runs_and_changes_or_all(
     assert "run 5, REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
     assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
-    monkeypatch.setattr(module, "SHOWN", 3)
+    monkeypatch.setattr(module, "MAX_SHOWN", 3)
     found = read_history([month])
     some, everything = document(found).text(), document(found, all_=True).text()
     assert "13 more: --all shows them" in some

@@ -158,7 +158,7 @@ def test_counts_of_configurations_moving_joints_and_errors_are_right() -> None:
     robot = next(robot for robot in document["robots"] if robot["findings"])
     first = robot["findings"][0]
     robot["findings"] = [{**first, "severity": "error"}, {**first, "severity": "warning"}]
-    assert pages.overview(robot, [])["findings"] == "1 error, 1 warning"
+    assert pages.overview_row(robot, [])["findings"] == "1 error, 1 warning"
     document = arms()
     robot = document["robots"][1]
     robot["verdict"], robot["checks"], robot["joints"], robot["results"] = "not verified", [], [], 0
@@ -171,7 +171,7 @@ def test_the_colour_of_the_heat_map_depends_on_the_ratio_to_the_bound() -> None:
     robot = arms()["robots"][1]
     model = present(robot["model"])
     _, rows = pages.heat_map(robot, model)
-    edges = (0.0, *pages.HEAT_STEPS)
+    edges = (0.0, *pages.HEAT_EDGES)
     largest = max(check["bound_ratio"] or 0.0 for check in robot["checks"])
     steps = [cell.step for _, cells in rows for cell in cells if cell.text]
     assert max(steps) == sum(largest > edge for edge in edges)
@@ -219,6 +219,6 @@ def test_a_value_that_is_not_finite_has_a_mark_in_the_plot_and_in_its_cell_of_th
     assert "not finite" in distributions(robot, document["histogram_edges"], "p0-")
     _, rows = pages.heat_map(robot, present(robot["model"]))
     cells = [cell for _, row in rows for cell in row]
-    red = [cell.step > len(pages.HEAT_STEPS) for cell in cells]
+    red = [cell.step > len(pages.HEAT_EDGES) for cell in cells]
     assert red == [cell.text == "not finite" for cell in cells]
     assert 0 < sum(red) < len(rows)

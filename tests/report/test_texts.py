@@ -15,7 +15,7 @@ from urdfkin.errors.escape import markdown_code, markdown_text
 from urdfkin.report.compare import compare, document
 from urdfkin.report.junit import as_junit
 from urdfkin.report.listing import print_document
-from urdfkin.report.markdown import LIMIT, as_markdown, fence_code
+from urdfkin.report.markdown import MAX_CHARACTERS, as_markdown, fence_code
 from urdfkin.report.terminal import print_report
 from urdfkin.validation.document import Document
 
@@ -50,7 +50,7 @@ def test_a_comment_on_a_thousand_robots_is_limited_and_counts_the_omitted_robots
     document = arms()
     document["robots"] = [copy.deepcopy(document["robots"][0]) for _ in range(1000)]
     markdown = as_markdown(document)
-    assert len(markdown) <= LIMIT < GITHUB_LIMIT
+    assert len(markdown) <= MAX_CHARACTERS < GITHUB_LIMIT
     assert "further robots left out" in markdown
 
 

@@ -22,7 +22,7 @@ from tests.robots.odd_urdfs import random_tree
 from tests.urdfs import built, joint
 from tests.urdfs import robot as robot_text
 from urdfkin.model.conventions import find_convention
-from urdfkin.report.junit import functions_as_junit
+from urdfkin.report.junit import function_checks_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
@@ -347,7 +347,7 @@ def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> No
     found = verify_function(lambda q: arm.jacobian(q, "tip", verify=False), arm, samples=5)
     assert found.oracle_bound_ratio is None
     assert "NOT checked" in str(found)
-    failures = [case.get("type") for case in junit_of(functions_as_junit([found])).iter("failure")]
+    failures = [case.get("type") for case in junit_of(function_checks_as_junit([found])).iter("failure")]
     assert failures == ["not verified"]
 
 

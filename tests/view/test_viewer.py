@@ -113,7 +113,7 @@ def test_the_text_field_shows_and_reads_q_in_a_convention() -> None:
         assert numbers == mujoco.to(q).tolist()
         assert viewer.words_of_q.label == "q of mujoco, to copy or type"
         viewer.words_of_q.value = format_values(mujoco.to(other := robot.sample(1, 6)[0]))
-        viewer._read_q(SimpleNamespace(client=object()))
+        viewer._read_q_field(SimpleNamespace(client=object()))
         np.testing.assert_array_equal(viewer.q, other)
 
 
@@ -232,12 +232,12 @@ def test_every_overlay_can_be_shown_in_every_reference_frame(viewer: Viewer) -> 
         assert viewer.motion.reference.name.lower() == reference
     for convention in ("standard", "modified", "none"):
         viewer.dh.value = convention
-        viewer._choose()
+        viewer._update_dh_table()
         assert (viewer._table is None) == (convention == "none")
     viewer.frame.value = "base_link"
-    viewer._choose()
+    viewer._update_dh_table()
     viewer.frame.value = viewer.robot.tip_frame
-    viewer._choose()
+    viewer._update_dh_table()
 
 
 def test_without_viser_the_error_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

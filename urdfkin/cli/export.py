@@ -36,7 +36,7 @@ from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_number_or_text
-from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
+from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
@@ -69,7 +69,7 @@ class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a
     metavar="NAMES",
     help="Quantities to export, separated by commas; repeatable: placement, velocity, jacobian,"
     " jacobian_rate, hessian, acceleration.",
-    show_default=",".join(QUANTITIES),
+    show_default=",".join(DEFAULT_QUANTITIES),
 )
 @reference_option
 @click.option(
@@ -127,21 +127,23 @@ def export_command(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_check_exported_file(file))
-    from urdfkin.export import code_in, write
+    from urdfkin.export import code_for_language, write
     from urdfkin.export.forms import make_robot_code
 
     assert robot is not None
     if to is None:
         to = "c" if output is None else _LANGUAGES_OF_SUFFIXES.get(output.suffix.lower(), "c")
     loaded = load_robot(robot, verify=verify)
-    names = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
+    names = [word.strip() for words in quantities for word in words.split(",")] or list(DEFAULT_QUANTITIES)
     frame = frame or loaded.tip_frame
-    code = code_in(make_robot_code(loaded, frame, names, reference, form, name=name, verify=verify), to)
+    code = code_for_language(
+        make_robot_code(loaded, frame, names, reference, form, name=name, verify=verify), to
+    )
     write_output(write(code, to, None if output is None else output.name), output)
     proof = code.proof
     say(format_check_line(proof.certificate), err=True)
-    if proof.constants and proof.certificate.verified:
-        say(f"The expressions were evaluated {proof.precision_text}. {proof.constants}", err=True)
+    if proof.constants_text and proof.certificate.verified:
+        say(f"The expressions were evaluated {proof.precision_text}. {proof.constants_text}", err=True)
     context.exit(certificate_exit_code(proof.certificate))
 
 

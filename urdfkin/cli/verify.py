@@ -148,9 +148,9 @@ def verify_command(
             for name, function in functions.items()
         ]
     if junit is not None:
-        from urdfkin.report.junit import functions_as_junit
+        from urdfkin.report.junit import function_checks_as_junit
 
-        write_file(junit, functions_as_junit(checks))
+        write_file(junit, function_checks_as_junit(checks))
     codes = [(3 if check.oracle_bound_ratio is None else 0) if check.agrees else 1 for check in checks]
     code = 1 if 1 in codes else max(codes)
     return Answer(lambda: _document(checks), {"json": lambda: _data(checks)}, "", code)

@@ -206,8 +206,8 @@ def plot_command(
     elif not any(text.startswith("random") for text in (start, end or "")):
         reject_unused_options(context, ("seed",), "without a random --from or --to")
     from urdfkin.robot.frame_motion import frame_motion
-    from urdfkin.view.figure import save
-    from urdfkin.view.plot import caption, plot_motion
+    from urdfkin.view.figure import figure_bytes
+    from urdfkin.view.plot import check_summary, plot_motion
 
     check_writable(output)
     loaded = load_robot(robot)
@@ -217,8 +217,8 @@ def plot_command(
         trajectory_ = _line(loaded, start, end or "", duration, samples, seed, convention)
     with report_compilation():
         motion = frame_motion(loaded, trajectory_, frame or loaded.tip_frame, reference)
-    write_file(output, save(plot_motion(loaded, motion, trajectory_, panels), output))
-    say(f"{loaded.name}: {motion.frame}: {caption(motion, trajectory_)}")
+    write_file(output, figure_bytes(plot_motion(loaded, motion, trajectory_, panels), output))
+    say(f"{loaded.name}: {motion.frame}: {check_summary(motion, trajectory_)}")
     context.exit(3 if motion.unverified_reason is not None else 0 if motion.agrees else 1)
 
 

@@ -26,10 +26,10 @@ LANGUAGES: dict[str, tuple[str, str]] = {
 #: Values of the argument `form` of `Robot.export`.
 FORMS = ("tree", "dh", "screws")
 #: Quantities that are exported by default.
-QUANTITIES = ("placement", "jacobian", "acceleration")
+DEFAULT_QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
-def code_in(code: FrameCode, to: str) -> FrameCode:
+def code_for_language(code: FrameCode, to: str) -> FrameCode:
     """Return exact code for sympy-exact, otherwise `code`."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
@@ -41,10 +41,10 @@ def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
-    from urdfkin.export.check import seal
+    from urdfkin.export.check import insert_seal
 
     module, suffix = LANGUAGES[to]
-    text = cast("str", importlib.import_module(module).write(code_in(code, to), to))
+    text = cast("str", importlib.import_module(module).write(code_for_language(code, to), to))
     if file is not None and re.fullmatch(r"\w[\w.-]*", file, re.ASCII):
         text = re.sub(rf"(?<=[ \"]){re.escape(code.name + suffix)}(?=[ )\"\n])", file, text)
-    return seal(text)
+    return insert_seal(text)

@@ -21,7 +21,7 @@ from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
-_TEMPLATES = Path(__file__).with_name("templates")
+_TEMPLATE_FOLDER = Path(__file__).with_name("templates")
 _FAST_FLAGS = "-O3 -march=native -ffp-contract=fast -fno-math-errno"
 _PLACEHOLDER = re.compile(r"@(\w+)@")
 
@@ -33,8 +33,8 @@ def write(code: FrameCode, to: str = "c") -> str:
     """
     return c_file(
         code,
-        comment_block(_header_lines(code)),
-        "\n".join([*test_vector_lines(code), main_program(code, "check_one.c")]),
+        comment_block(_file_comment_lines(code)),
+        "\n".join([*declare_test_vectors(code), main_program(code, "check_one.c")]),
     )
 
 
@@ -52,7 +52,7 @@ def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
 
 def fill_template(name: str, /, **texts: str | int) -> str:
     """Fill a template's placeholders, `@name@`."""
-    template = (_TEMPLATES / name).read_text(encoding="utf-8")
+    template = (_TEMPLATE_FOLDER / name).read_text(encoding="utf-8")
     return _PLACEHOLDER.sub(lambda found: str(texts[found[1]]), template)
 
 
@@ -64,7 +64,7 @@ def comment_block(lines: Sequence[str]) -> str:
     return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
 
 
-def _header_lines(code: FrameCode) -> list[str]:
+def _file_comment_lines(code: FrameCode) -> list[str]:
     name, up = code.name, code.name.upper()
     return [
         *code.header,
@@ -124,9 +124,9 @@ def _function(code: FrameCode, function: Function) -> str:
         unused=lines(f"(void){x};" for x in widths),
         lines=lines(_body_lines(writer, layout)),
         sines=lines(_sine_lines(writer, layout)),
-        reads=lines(_read_lines(layout, widths)),
+        reads=lines(_lane_read_lines(layout, widths)),
         lane_sines=lines(_lane_sine_lines(writer, layout)),
-        reserve=count_reserved(code, function),
+        reserve=min_configuration_count(code, function),
         passed=", ".join(widths),
         advance=advance_pointers(code, function),
         advance_m=lines((f"{x} += m * {width};" for x, width in widths.items()), " " * 8),
@@ -143,7 +143,7 @@ def _function(code: FrameCode, function: Function) -> str:
     )
 
 
-def count_reserved(code: FrameCode, function: Function) -> int:
+def min_configuration_count(code: FrameCode, function: Function) -> int:
     """Return the least number of configurations for which every array has at least eight numbers.
 
     Arrays without numbers do not count.
@@ -168,14 +168,14 @@ class InputLayout:
         self.inputs = [*(node for node in inputs if node not in input_angles), *input_angles]
         self.computed_angles = [node for node in function.angles if node not in input_angles]
         self.angles = [*input_angles, *self.computed_angles]
-        self.first = len(self.inputs) - len(input_angles)
-        self.size = max(1, self.first + 3 * len(self.angles))
+        self.first_angle = len(self.inputs) - len(input_angles)
+        self.size = max(1, self.first_angle + 3 * len(self.angles))
 
     def index(self, node: Node) -> int:
         if node.op in ("sin", "cos"):
             return self.index(node.operands[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
-            return self.first + self.angles.index(node)
+            return self.first_angle + self.angles.index(node)
         return self.inputs.index(node)
 
 
@@ -191,7 +191,7 @@ def _body_lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
 def _sine_lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     count = len(layout.angles)
     yield from (f"{angle};" for angle in _computed_angle_lines(writer, layout, "in[{}]"))
-    for k in range(layout.first, layout.first + count):
+    for k in range(layout.first_angle, layout.first_angle + count):
         yield f"in[{k + count}] = sin(in[{k}]);"
         yield f"in[{k + 2 * count}] = cos(in[{k}]);"
 
@@ -202,7 +202,7 @@ def _computed_angle_lines(writer: Writer, layout: InputLayout, at: str) -> Itera
         yield f"{at.format(layout.index(node))} = {value}"
 
 
-def _read_lines(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
+def _lane_read_lines(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
     for x, width in widths.items():
         for first in range(0, width, 8):
             found = [node for node in layout.inputs if node.op == x and node.operands[0] // 8 == first // 8]
@@ -219,14 +219,14 @@ def _lane_sine_lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     if count := len(layout.angles):
         for assignment in _computed_angle_lines(writer, layout, "in[{} * LANES + k]"):
             yield f"for (int k = 0; k < LANES; ++k) {assignment};"
-        arrays = (f"in + {layout.first + k * count} * LANES" for k in range(3))
+        arrays = (f"in + {layout.first_angle + k * count} * LANES" for k in range(3))
         yield f"sines_cosines({', '.join(arrays)}, {count});"
 
 
 # -- the test vectors of a function ------------------------------------------------------------------------
 
 
-def test_vector_lines(code: FrameCode) -> Iterator[str]:
+def declare_test_vectors(code: FrameCode) -> Iterator[str]:
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits; the tolerances in double and single precision, in eps. */"
     for k, letter in enumerate(code.inputs):
@@ -240,11 +240,11 @@ def test_vector_lines(code: FrameCode) -> Iterator[str]:
 
 
 def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
-    inside = ",\n".join(f"    {{\n{_numbers(row)}}}" for row in rows)
+    inside = ",\n".join(f"    {{\n{_wrap_numbers(row)}}}" for row in rows)
     return f"static const double {declared} = {{\n{inside}\n}};"
 
 
-def _numbers(values: Sequence[str]) -> str:
+def _wrap_numbers(values: Sequence[str]) -> str:
     lines, line = list[str](), "       "
     for value in values:
         if len(line) + len(value) > 108:
@@ -267,9 +267,9 @@ def _check(code: FrameCode, function: Function, template: str) -> str:
     widths, n = code.widths(function), len(code.proof.vectors)
     sizes = {x: max(1, width) for x, width in widths.items()}
 
-    def fill(element: str, vector: str) -> str:
+    def fill_inputs(index: str, vector: str) -> str:
         return "\n".join(
-            f"            for (int i = 0; i < {size}; ++i) {x}{element} = R(given_{x}[{vector}][i]);"
+            f"            for (int i = 0; i < {size}; ++i) {x}{index} = R(given_{x}[{vector}][i]);"
             for x, size in sizes.items()
         )
 
@@ -281,8 +281,8 @@ def _check(code: FrameCode, function: Function, template: str) -> str:
         n=n,
         count=len(function.results),
         arrays=", ".join(f"{x}[N][{size}]" for x, size in sizes.items()),
-        fill=fill("[k][i]", f"k % {n}"),
-        fill_one=fill("[i]", "k"),
+        fill=fill_inputs("[k][i]", f"k % {n}"),
+        fill_one=fill_inputs("[i]", "k"),
         passed=", ".join(widths),
         all=", ".join(f"&{x}[0][0]" for x in widths),
         each_array=", ".join(f"{x}[{size}]" for x, size in sizes.items()),

@@ -25,24 +25,24 @@ from urdfkin.system.processes import python_command
 
 #: Text in the first lines of every exported file.
 EXPORT_MARK = "straight-line code for this robot and frame"
-_ZEROS = "0" * 64
-#: In this line, `seal` replaces the zeros by the digest.
-SEAL = f"Seal sha256 {_ZEROS}"
+_DIGEST_PLACEHOLDER = "0" * 64
+#: In this line, `insert_seal` replaces the zeros by the digest.
+SEAL = f"Seal sha256 {_DIGEST_PLACEHOLDER}"
 _SEAL_LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
-_MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
-_FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
-_STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+_MAIN_MACRO = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
+_OCTAVE_FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
+_STRICT_FLAGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
 _CUDA_SUFFIXES = (".cuh", ".cu")
 #: Compiler and options for each suffix.
-_COMPILE = {
-    ".c": ("cc", "-std=c99", "-x", "c", *_STRICT),
+_COMPILE_COMMANDS = {
+    ".c": ("cc", "-std=c99", "-x", "c", *_STRICT_FLAGS),
     **dict.fromkeys(
         (".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx", *_CUDA_SUFFIXES),
-        ("c++", "-std=c++11", "-x", "c++", *_STRICT),
+        ("c++", "-std=c++11", "-x", "c++", *_STRICT_FLAGS),
     ),
 }
 #: Compiler and options for CUDA if the computer has nvcc and a GPU.
-_COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
+_GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
 _HEADER_LENGTH = 2000
 #: Time limit of a compiler or a test program, s.
@@ -50,7 +50,7 @@ _HEADER_LENGTH = 2000
 _TIME_LIMIT = 600.0
 
 
-def seal(text: str) -> str:
+def insert_seal(text: str) -> str:
     """Insert the digest into the header."""
     return _SEAL_LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
@@ -63,7 +63,7 @@ def _has_valid_seal(text: str) -> bool | None:
     text = text.replace("\r\n", "\n")
     if (found := _SEAL_LINE.search(text)) is None:
         return None
-    return _digest(_SEAL_LINE.sub(lambda line: line[1] + _ZEROS, text, count=1)) == found[2]
+    return _digest(_SEAL_LINE.sub(lambda line: line[1] + _DIGEST_PLACEHOLDER, text, count=1)) == found[2]
 
 
 def _digest(text: str) -> str:
@@ -92,7 +92,7 @@ def check(file: Path) -> FileCheck:
     text = read_text(file)
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
-    runs = {**dict.fromkeys(_COMPILE, _run_compiled), ".py": _run_imported, ".m": _run_octave}
+    runs = {**dict.fromkeys(_COMPILE_COMMANDS, _run_compiled), ".py": _run_imported, ".m": _run_octave}
     if (run := runs.get(file.suffix)) is None:
         raise InputError(
             "urdfkin cannot run an exported file of this kind",
@@ -129,9 +129,13 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
 
     Of a CUDA file, the GPU functions are checked only if nvcc and a GPU are available.
     """
-    name = _find_program_name(_MAIN, text, file)
+    name = _find_program_name(_MAIN_MACRO, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
-    command = _COMPILE_FOR_GPU if file.suffix in _CUDA_SUFFIXES and _has_gpu() else _COMPILE[file.suffix]
+    command = (
+        _GPU_COMPILE_COMMAND
+        if file.suffix in _CUDA_SUFFIXES and _has_gpu()
+        else _COMPILE_COMMANDS[file.suffix]
+    )
     compiler = _find_program(command[0], file)
     for real in ("double", "float"):
         macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
@@ -147,7 +151,7 @@ def _run_imported(file: Path, text: str, folder: Path) -> Iterator[str]:
 
 
 def _run_octave(file: Path, text: str, folder: Path) -> Iterator[str]:
-    name = _find_program_name(_FUNCTION, text, file)
+    name = _find_program_name(_OCTAVE_FUNCTION, text, file)
     _copy(text, folder / f"{name}.m")
     octave = [_find_program("octave-cli", file), "--no-init-file", "--no-site-file"]
     yield from _run([*octave, "--eval", f"{name}().check();"], file, cwd=folder)

@@ -165,7 +165,7 @@ def make_unverified_code(
 
 
 def exportable_quantities() -> list[Quantity]:
-    return [row for row in recursive_quantities() if row.name in recursion.QUANTITIES]
+    return [row for row in recursive_quantities() if row.name in recursion.QUANTITY_FUNCTIONS]
 
 
 def _parse_quantities(names: Collection[str]) -> list[Quantity]:

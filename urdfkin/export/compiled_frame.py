@@ -30,7 +30,7 @@ from urdfkin.compiled.kernel_cache import compile_lock
 from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, aligned_empty
 from urdfkin.compiled.prepared import FastFunction
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.export.c import InputLayout, advance_pointers, c_file, count_reserved, fill_template
+from urdfkin.export.c import InputLayout, advance_pointers, c_file, fill_template, min_configuration_count
 from urdfkin.export.code import FrameCode, make_unverified_code
 from urdfkin.export.proof import PROOF_SAMPLES
 from urdfkin.model.configuration import draw_samples, warn_of_degrees
@@ -105,7 +105,7 @@ def _entry_point(code: FrameCode) -> str:
         size=layout.size,
         spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
         count=len(function.results),
-        reserve=count_reserved(code, function),
+        reserve=min_configuration_count(code, function),
         advance=advance_pointers(code, function),
         **texts,
     )
@@ -171,16 +171,16 @@ _MAX_RESULTS = 8192
 _N, _OUT, _STAGE, *_INPUTS = map(
     int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.BUFFER, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
-_Arguments = ctypes.c_int64 * len(KernelArgs)
-_DOUBLE = np.dtype(np.float64)
-_compiling = make_fork_safe_lock()
+_ArgumentArray = ctypes.c_int64 * len(KernelArgs)
+_FLOAT64 = np.dtype(np.float64)
+_machine_code_lock = make_fork_safe_lock()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
     return (
         type(x) is np.ndarray
         and x.shape == shape
-        and x.dtype is _DOUBLE
+        and x.dtype is _FLOAT64
         and x.flags.c_contiguous
         and x.flags.aligned
     )
@@ -355,7 +355,7 @@ class CompiledFrame:
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
-        with _compiling:
+        with _machine_code_lock:
             if row.name not in self._machine_codes:
                 self._machine_codes[row.name] = self._make_machine_code(row)
             return self._machine_codes[row.name]
@@ -433,19 +433,21 @@ class CompiledFrame:
     def _run(
         self, task: Any, row: Quantity, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
     ) -> None:
-        def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
-            arguments = _Arguments()
-            arguments[_N], arguments[_OUT] = len(part), address(part)
+        def compute_block(block_inputs: Sequence[FloatArray], block_out: FloatArray) -> int:
+            arguments = _ArgumentArray()
+            arguments[_N], arguments[_OUT] = len(block_out), address(block_out)
             # The code writes eight numbers at once.
             # Therefore, the code may write up to seven numbers beyond the results.
             # The buffer `stage` has space for these additional numbers.
             stage = (
-                aligned_empty(LANES * part[0].size + LANES) if row.has_columns and uses_buffer(out) else None
+                aligned_empty(LANES * block_out[0].size + LANES)
+                if row.has_columns and uses_buffer(out)
+                else None
             )
             arguments[_STAGE] = 0 if stage is None else address(stage)
-            for index, x in zip(_INPUTS, parts, strict=False):
+            for index, x in zip(_INPUTS, block_inputs, strict=False):
                 arguments[index] = address(x)
             return int(task(arguments))
 
-        if compute_in_threads(compute, inputs, out, threads):
+        if compute_in_threads(compute_block, inputs, out, threads):
             raise NotFiniteError("q, v and a must be finite")

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 
 from urdfkin.export.c import (
     comment_block,
+    declare_test_vectors,
     describe_result,
     fill_template,
     main_program,
     parameter_list,
-    test_vector_lines,
 )
 from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.function import Function
@@ -29,9 +29,11 @@ def write(code: FrameCode, to: str = "cpp") -> str:
     return _cuda(code) if to == "cuda" else _cpp(code)
 
 
-def _header(file: str, code: FrameCode, head: list[str], before: str, *templates: str, **texts: str) -> str:
+def _header(
+    file: str, code: FrameCode, head: list[str], qualifier: str, *templates: str, **texts: str
+) -> str:
     name, up = code.name, code.name.upper()
-    functions = (line for function in code.functions for line in _function(code, function, before))
+    functions = (line for function in code.functions for line in _function(code, function, qualifier))
     return fill_template(
         file,
         head=comment_block([*code.header, "", *head]),
@@ -39,7 +41,7 @@ def _header(file: str, code: FrameCode, head: list[str], before: str, *templates
         UP=up,
         start=fill_template("main.hpp", title=name, UP=up).rstrip(),
         functions="\n".join(functions),
-        main="\n".join([*test_vector_lines(code), main_program(code, *templates)]),
+        main="\n".join([*declare_test_vectors(code), main_program(code, *templates)]),
         **texts,
     )
 
@@ -86,13 +88,15 @@ def _cuda(code: FrameCode) -> str:
         f"{up}_BOTH ",
         "check_one.hpp",
         "check_one.cuh",
-        declarations="\n".join(f"{line};" for f in code.functions for line in _declarations(code, f)),
-        kernels="".join(_kernel(code, function) for function in code.functions),
+        declarations="\n".join(
+            f"{line};" for f in code.functions for line in _entry_point_declarations(code, f)
+        ),
+        kernels="".join(_cuda_kernel(code, function) for function in code.functions),
         entries="\n".join(_entry_points(code, function) for function in code.functions),
     )
 
 
-def _declarations(code: FrameCode, function: Function) -> list[str]:
+def _entry_point_declarations(code: FrameCode, function: Function) -> list[str]:
     name = f"{code.name}_{function.name}"
     return [
         f"int {name}_{real}(size_t n, {parameter_list(function, real)}, struct CUstream_st *stream)"
@@ -102,10 +106,12 @@ def _declarations(code: FrameCode, function: Function) -> list[str]:
 
 def _entry_points(code: FrameCode, function: Function) -> str:
     call = f"{code.name}_kinematics::{function.name}_batch(n, {', '.join(function.inputs)}, out, stream)"
-    return "\n".join(f"{line}\n{{\n    return {call};\n}}" for line in _declarations(code, function))
+    return "\n".join(
+        f"{line}\n{{\n    return {call};\n}}" for line in _entry_point_declarations(code, function)
+    )
 
 
-def _kernel(code: FrameCode, function: Function) -> str:
+def _cuda_kernel(code: FrameCode, function: Function) -> str:
     widths = code.widths(function)
     return fill_template(
         "kernel.cuh",
@@ -122,10 +128,10 @@ def _kernel(code: FrameCode, function: Function) -> str:
     )
 
 
-def _function(code: FrameCode, function: Function, before: str) -> Iterator[str]:
+def _function(code: FrameCode, function: Function, qualifier: str) -> Iterator[str]:
     writer = Writer(code, function, lambda x: f"T({x!r})")
     yield f"\n/* {describe_result(function)}, row by row; {function.operation_count} operations. */"
-    yield f"template <class T> {before}void {function.name}({parameter_list(function, 'T')})\n{{"
+    yield f"template <class T> {qualifier}void {function.name}({parameter_list(function, 'T')})\n{{"
     yield "    using std::cos;\n    using std::sin;\n    using std::sqrt;"
     yield from (f"    (void){letter};" for letter in function.inputs)
     for node in writer.inputs:

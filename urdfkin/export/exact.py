@@ -40,7 +40,7 @@ from urdfkin.verify.verifier import Verifier
 
 #: Larger angles (rad) are never replaced by multiples of pi/12.
 #: Up to this angle, the distance between neighbouring doubles is far smaller than pi/12.
-_MAX_ANGLE = 100.0
+_MAX_PI_MULTIPLE_ANGLE = 100.0
 #: Sine and cosine of 0, pi/2, pi and 3 pi/2.
 _RIGHT_ANGLES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
@@ -77,14 +77,14 @@ class ExactGraph(Graph):
             raise TypeError(f"an operand of {op} is a double")
         return super().make_node(op, *operands)
 
-    def angle(self, x: Fraction) -> Fraction | PiMultiple:
+    def exact_angle(self, x: Fraction) -> Fraction | PiMultiple:
         """Replace multiples of pi/12 by `PiMultiple`."""
-        factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_ANGLE else None
+        factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_PI_MULTIPLE_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
         if not isinstance(x, Node | PiMultiple):
-            x = self.angle(Fraction(x))
+            x = self.exact_angle(Fraction(x))
         if x == 0:
             return 0, 1
         if isinstance(x, PiMultiple) and (2 * x.factor).denominator == 1:
@@ -111,8 +111,8 @@ def make_exact_plan(
         joint, own = tree.joints[i], joints[i]
         R, p = eq.product(R, own.R), eq.point_position(p, R, own.p)
         if joint.kind.nv:
-            A = _aligning(own.axis, float(joint.axis[2])) if joint.kind.has_axis else IDENTITY
-            offset = graph.angle(Fraction(own.offset)) if joint.kind.turns else own.offset
+            A = _rotation_with_z_axis(own.axis, float(joint.axis[2])) if joint.kind.has_axis else IDENTITY
+            offset = graph.exact_angle(Fraction(own.offset)) if joint.kind.turns else own.offset
             rows.append((*(x for row in eq.product(R, A) for x in row), *p, own.multiplier, offset))
             R, p = eq.transposed(A), ZERO
     geometry = np.array(rows, dtype=object).reshape(-1, len(plan.geometry.T))
@@ -121,7 +121,7 @@ def make_exact_plan(
     return replace(plan, geometry=geometry, offsets=offsets, multipliers=multipliers)
 
 
-def _aligning(axis: Vector, z: float) -> Matrix:
+def _rotation_with_z_axis(axis: Vector, z: float) -> Matrix:
     """Return a rotation matrix with third column `axis`.
 
     See `rotation_with_z_axis`. `axis` is a unit vector. `z` is the third component of `axis`, as a float.
@@ -143,7 +143,7 @@ def to_interval(x: Number) -> Number:
     return as_interval(x.numerator) / x.denominator if isinstance(x, Fraction) else as_interval(x)
 
 
-_OPERATIONS: dict[str, Callable[..., Number]] = {
+_INTERVAL_OPERATIONS: dict[str, Callable[..., Number]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
@@ -158,15 +158,15 @@ _OPERATIONS: dict[str, Callable[..., Number]] = {
 def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
     values: dict[Any, Number] = {}
 
-    def value(x: Number) -> Number:
+    def interval_of(x: Number) -> Number:
         return values[x] if isinstance(x, Node) else to_interval(x)
 
     for node in function.nodes:
         if node.op in INPUT_LETTERS:
             values[node] = as_interval(inputs[INPUT_LETTERS.index(node.op)][node.operands[0]])
         else:
-            values[node] = _OPERATIONS[node.op](*map(value, node.operands))
-    return list(map(value, function.results))
+            values[node] = _INTERVAL_OPERATIONS[node.op](*map(interval_of, node.operands))
+    return list(map(interval_of, function.results))
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class ExactProof(Proof):
         return f"at {DIGITS} digits"
 
     @property
-    def constants(self) -> str:
+    def constants_text(self) -> str:
         change = f", changed by at most {self.max_angle_change:.1e} rad" if self.angle_count else ""
         angles = f"{self.angle_count} different angles are multiples of pi"
         return f"Constants are the URDF's decimals; {angles}{change}"
@@ -238,7 +238,7 @@ def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> Float
     return np.array(rows).reshape(-1, *function.shape)
 
 
-def format_literal(x: Number) -> str:
+def format_exact_literal(x: Number) -> str:
     """Return code such as `Rational(17, 40)`."""
     if isinstance(x, PiMultiple):
         text = format_pi_fraction(abs(x.factor)).replace("pi", "*pi").removeprefix("*")

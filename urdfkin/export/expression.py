@@ -31,7 +31,7 @@ from urdfkin.kinematics.arithmetic import bind_equations
 
 #: A number in an equation: a float, or a node of the graph.
 Number = Any
-_EQUATIONS = re.compile(r"(?:7\.\d+(?:, )?)+")
+_EQUATION_NUMBERS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
 
 class Node:
@@ -93,7 +93,7 @@ class Graph:
     def __init__(self) -> None:
         self._nodes: dict[tuple[Any, ...], Node] = {}
         self.step, self.equation = 0, ""
-        self.chapter: Any = bind_equations(decorate=self._record_numbers)
+        self.chapter: Any = bind_equations(decorate=self._record_equation_numbers)
 
     def make_input(self, letter: str, index: int) -> Node:
         return self.make_node(letter, index)
@@ -148,18 +148,18 @@ class Graph:
                 return -(positive * other)
         return self.make_node("*", *_sort_operands(x, y))
 
-    def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
+    def _record_equation_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
         """Wrap an equation, so that each new node stores the equation's number.
 
         If an equation calls another equation, all nodes store the number of the first equation.
         """
-        found = _EQUATIONS.match(equation.__doc__ or "")
+        found = _EQUATION_NUMBERS.match(equation.__doc__ or "")
         if found is None:
             return equation
         numbers = found[0].rstrip(", ")
 
         @wraps(equation)
-        def recording(*arguments: Any) -> Any:
+        def numbered_equation(*arguments: Any) -> Any:
             if self.equation:
                 return equation(*arguments)
             self.equation = numbers
@@ -168,7 +168,7 @@ class Graph:
             finally:
                 self.equation = ""
 
-        return recording
+        return numbered_equation
 
 
 def _equals(x: Number, value: float) -> bool:

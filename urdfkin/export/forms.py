@@ -16,7 +16,7 @@ from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError
-from urdfkin.export import FORMS, QUANTITIES
+from urdfkin.export import DEFAULT_QUANTITIES, FORMS
 from urdfkin.export.code import FrameCode, make_verified_code
 from urdfkin.export.naming import safe_name, unique_safe_names
 from urdfkin.model.reference import Reference
@@ -69,7 +69,7 @@ def make_chain_code(
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
     if quantities is None:
-        quantities = QUANTITIES if robot.nv else QUANTITIES[:1]
+        quantities = DEFAULT_QUANTITIES if robot.nv else DEFAULT_QUANTITIES[:1]
     return make_verified_code(
         robot.verifier,
         robot.plan,

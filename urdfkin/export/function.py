@@ -49,9 +49,9 @@ INPUT_LETTERS = ("q", "v", "a")
 #: Operations whose result is always assigned to a variable.
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement.
-_MAX_OPERATIONS = 12
+_MAX_STATEMENT_OPERATIONS = 12
 #: Maximum number of results whose derivatives are computed together, to limit memory.
-_MAX_RESULTS = 512
+_RESULTS_PER_PASS = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class Function:
                 node.name
                 or uses[node] > 1
                 or node.op in _ASSIGNED_OPERATIONS
-                or length[node] > _MAX_OPERATIONS
+                or length[node] > _MAX_STATEMENT_OPERATIONS
             ):
                 found.append(node)
                 length[node] = 0
@@ -199,7 +199,7 @@ def make_function(
         else [0.0] * plan.nv
         for letter in INPUT_LETTERS
     ]
-    results = recursion.QUANTITIES[quantity.name](plan, kind, inputs, reference)
+    results = recursion.QUANTITY_FUNCTIONS[quantity.name](plan, kind, inputs, reference)
     # The sum with 0.0 turns -0.0 into 0.0.
     return Function(
         quantity, reference, plan, tuple(x + 0.0 if isinstance(x, int | float) else x for x in results)
@@ -229,8 +229,8 @@ def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArra
     """
     value = function.node_values(inputs)
     bounds = np.zeros((len(inputs[0]), len(function.results)))
-    for first in range(0, bounds.shape[1], _MAX_RESULTS):
-        part = slice(first, first + _MAX_RESULTS)
+    for first in range(0, bounds.shape[1], _RESULTS_PER_PASS):
+        part = slice(first, first + _RESULTS_PER_PASS)
         bounds[:, part] = _bounds_of_results(function, value, function.results[part], len(bounds))
     return bounds
 
@@ -240,7 +240,7 @@ def _bounds_of_results(
 ) -> FloatArray:
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
-    def propagate(x: Number, slope: FloatArray, columns: slice | int) -> None:
+    def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
         """Add `slope` to the derivatives with respect to x.
 
         A constant increases the bounds.
@@ -254,7 +254,7 @@ def _bounds_of_results(
             slopes[x][:, columns] = slope
 
     for k, x in enumerate(results):
-        propagate(x, np.ones(n), k)
+        add_derivative(x, np.ones(n), k)
     for node in reversed(function.nodes):
         if (slope := slopes.pop(node, None)) is None:
             continue
@@ -262,7 +262,7 @@ def _bounds_of_results(
         if node.op not in INPUT_LETTERS:
             operands = [value[x] if isinstance(x, Node) else x for x in node.operands]
             for x, factor in zip(node.operands, _SLOPES[node.op](value[node], *operands), strict=True):
-                propagate(x, slope * np.reshape(factor, (-1, 1)), slice(None))
+                add_derivative(x, slope * np.reshape(factor, (-1, 1)), slice(None))
     return np.where(np.isnan(bound), np.inf, bound)
 
 
@@ -275,16 +275,16 @@ def _operation_error(node: Node, x: FloatArray) -> FloatArray:
         error = np.maximum(SINGLE_OPERATION_ERRORS[node.op] * size, SINGLE_POLYNOMIAL_ERROR)
     else:
         error = SINGLE_OPERATION_ERRORS[node.op] * size
-    return _in_range(error, size)
+    return _add_range_error(error, size)
 
 
 def _constant_error(x: float) -> float:
     """Return a constant's error in single precision, in eps."""
     size = np.abs(x)
-    return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
+    return float(_add_range_error(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 
 
-def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
+def _add_range_error(error: FloatArray, size: FloatArray) -> FloatArray:
     """Add errors of numbers that underflow.
 
     Overflow gives inf.

@@ -18,7 +18,7 @@ from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
 #: The textbook's symbols for a link's pose, velocity and acceleration.
-_LETTERS = {
+_STATE_SYMBOLS = {
     "R": "R",
     "p": "p",
     "w": r"\omega",
@@ -26,8 +26,8 @@ _LETTERS = {
     "alpha": r"\dot{\omega}",
     "acc": r"\ddot{p}",
 }
-_NAME = re.compile(r"(R|p|w|vel|alpha|acc)(\d+)_(\w+)")
-_FUNCTION = re.compile(r"\b(sin|cos|sqrt)\(")
+_STATE_NAME = re.compile(r"(R|p|w|vel|alpha|acc)(\d+)_(\w+)")
+_FUNCTION_CALL = re.compile(r"\b(sin|cos|sqrt)\(")
 _RESULTS = {
     "placement": "T",
     "velocity": "v",
@@ -79,7 +79,7 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
 
 def _align_lines(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
     yield r"\begin{align*}"
-    yield " \\\\\n".join(f"{symbol} &= {_formula(value)}" for symbol, value in lines)
+    yield " \\\\\n".join(f"{symbol} &= {_format_formula(value)}" for symbol, value in lines)
     yield r"\end{align*}"
 
 
@@ -88,13 +88,13 @@ def _symbol(node: Node, name: str) -> str:
         return f"{node.op}_{{{node.operands[0] + 1}}}"
     if node.op in ("sin", "cos"):
         return f"{node.op[0]}_{{{node.step + 1}}}"
-    if found := _NAME.fullmatch(name):
-        return f"{_LETTERS[found[1]]}^{{({found[2]})}}_{{{found[3]}}}"
+    if found := _STATE_NAME.fullmatch(name):
+        return f"{_STATE_SYMBOLS[found[1]]}^{{({found[2]})}}_{{{found[3]}}}"
     return f"t_{{{name[1:]}}}"
 
 
-def _formula(text: str) -> str:
-    return _FUNCTION.sub(r"\\operatorname{\1}(", text).replace(" * ", r" \, ")
+def _format_formula(text: str) -> str:
+    return _FUNCTION_CALL.sub(r"\\operatorname{\1}(", text).replace(" * ", r" \, ")
 
 
 def _literal(x: float) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.function import Function
 
-_CHECK = """
+_CHECK_TEMPLATE = """
 function check()
 % For each function the largest error as a share of its tolerance: at most 1.
 {inputs}
@@ -87,7 +87,7 @@ def _check(code: FrameCode) -> str:
             "end",
             f"report('{name}', found, right, within);",
         ]
-    return _CHECK.format(inputs="\n".join(inputs), functions="\n".join(checks), n=len(vectors))
+    return _CHECK_TEMPLATE.format(inputs="\n".join(inputs), functions="\n".join(checks), n=len(vectors))
 
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:

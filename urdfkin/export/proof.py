@@ -90,7 +90,7 @@ class Proof:
         return "in double precision"
 
     @property
-    def constants(self) -> str:
+    def constants_text(self) -> str:
         return ""
 
     @property
@@ -111,7 +111,7 @@ class Proof:
             f"URDF sha256 {self.sha256}",
             *(f"Joint {comment_name(name)} is locked at {value!r}" for name, value in self.lock),
             f"Written by urdfkin {self.urdfkin}{self._vectors_text}",
-            *([self.constants] if self.constants else []),
+            *([self.constants_text] if self.constants_text else []),
         ]
 
     @property
@@ -197,7 +197,7 @@ def _make_vectors(
     path, vectors = tree.path(link), []
     errors = conversion_errors(verifier.text, tree, path, part.q)
     for f in functions:
-        tolerances[f.name], scale = _find_tolerances(f, part, errors)
+        tolerances[f.name], scale = _tolerances_and_scales(f, part, errors)
         single_tolerances[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * tolerances[f.name]
         relative_bounds = np.divide(
             single_tolerances[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0
@@ -219,7 +219,7 @@ def _make_vectors(
     return tuple(vectors), largest_bounds
 
 
-def _find_tolerances(
+def _tolerances_and_scales(
     function: Function, part: CallPart, errors: DecimalErrors
 ) -> tuple[FloatArray, FloatArray]:
     """Return error bounds and scales.

@@ -27,20 +27,20 @@ class Dialect:
     Attributes:
         result: Yields the lines that return the results.
         imports: Import lines. `{}` is replaced by the needed functions, such as `cos, sin`.
-        values: Body of the exported function `_values`.
+        values_body: Body of the exported function `_values`.
             `_values` evaluates a function at several configurations.
-        index: Pattern of an input's number, such as `q[0]`.
+        input_format: Pattern of an input's number, such as `q[0]`.
         check_parameter: Parameter of the exported `check`.
     """
 
     about: str
     imports: str
     result: Callable[[Writer], Iterator[str]]
-    values: str
+    values_body: str
     decorator: str = ""
     first_lines: Callable[[Writer], list[str]] = lambda writer: []
     helpers: str = ""
-    index: str = "{}[{}]"
+    input_format: str = "{}[{}]"
     check_parameter: str = ""
     has_single_precision: bool = False
     more_code: Callable[[FrameCode], str] = lambda code: ""
@@ -91,7 +91,7 @@ def _numpy_first_lines(writer: Writer) -> list[str]:
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [
         *(f"{x} = np.asarray({x})" for x in inputs),
-        *_check_lines(writer),
+        *_input_check_lines(writer),
         *(f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs),
         f"shape = np.broadcast_shapes({shapes})",
     ]
@@ -110,9 +110,9 @@ def _zero(writer: Writer, xp: str) -> str:
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
 
 
-def _check_lines(writer: Writer, first: str = "") -> list[str]:
+def _input_check_lines(writer: Writer, namespace: str = "") -> list[str]:
     return [
-        f'_demand({first}"{x}", {x}, {width})' for x, width in writer.code.widths(writer.function).items()
+        f'_demand({namespace}"{x}", {x}, {width})' for x, width in writer.code.widths(writer.function).items()
     ]
 
 
@@ -128,10 +128,10 @@ def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
     return first_lines
 
 
-def _in_any_namespace(writer: Writer) -> list[str]:
-    used = [name for name in _FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
+def _array_first_lines(writer: Writer) -> list[str]:
+    used = [name for name in _MATH_FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
     names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
-    return ["xp = _namespace(q)", *_check_lines(writer, "xp, "), *names, _zero(writer, "xp")]
+    return ["xp = _namespace(q)", *_input_check_lines(writer, "xp, "), *names, _zero(writer, "xp")]
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
@@ -167,7 +167,7 @@ def _namespace(x):
         ) from None
 '''
 
-_DEMAND = '''
+_INPUT_CHECK = '''
 def _demand({given}name, x, width):
     """Raise an error if an input is not {array} (..., width) of {numbers}."""
 {is_array}    if {wrong}:
@@ -181,17 +181,23 @@ _IS_ARRAY = """    if not {is_array}:
 """
 
 
-def _make_check(
-    wrong: str, given: str = "", numbers: str = "a floating type", array: str = "an array", is_array: str = ""
+def _make_input_check(
+    wrong_type: str,
+    parameters: str = "",
+    numbers: str = "a floating type",
+    array: str = "an array",
+    is_array: str = "",
 ) -> str:
     """Return code of the function `_demand`.
 
-    `wrong` and `is_array` are Python expressions. `wrong` is true for numbers of a wrong type. `is_array`
-    tests whether the input `x` is an array. If `is_array` is empty, `_demand` omits this test. `given`
-    contains further parameters of `_demand`.
+    `wrong_type` and `is_array` are Python expressions. `wrong_type` is true for numbers of a wrong type.
+    `is_array` tests whether the input `x` is an array. If `is_array` is empty, `_demand` omits this test.
+    `parameters` contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
-    return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
+    return _INPUT_CHECK.format(
+        given=parameters, array=array, numbers=numbers, is_array=first, wrong=wrong_type
+    )
 
 
 _STACKED = '''
@@ -203,7 +209,7 @@ def _stacked({given}values, zero, shape):
 '''
 
 
-_MODULE = '''
+_TORCH_MODULE = '''
 class Kinematics(torch.nn.Module):
     """The functions of this file; `forward` is `{first}`. Results have the inputs' type and device."""
 
@@ -237,19 +243,19 @@ def gradients(device="cpu"):
 '''
 
 
-def _torch_module(code: FrameCode) -> str:
+def _torch_module_code(code: FrameCode) -> str:
     # The method `forward` calls the exported function with the fewest of the inputs q, v and a.
     first = min(code.functions, key=lambda function: len(function.inputs))
-    return _MODULE.format(
+    return _TORCH_MODULE.format(
         first=first.name,
         inputs=", ".join(first.inputs),
         functions="\n".join(f"    {f.name} = staticmethod({f.name})" for f in code.functions),
         all=_function_list(code),
-        rate=_rotation_bound(code.functions[0].plan),
+        rate=_rotation_rate_bound(code.functions[0].plan),
     ).lstrip("\n")
 
 
-def _rotation_bound(plan: CompiledTree) -> float:
+def _rotation_rate_bound(plan: CompiledTree) -> float:
     """Bound a vector's rotation due to a change of one coordinate.
 
         r >= angle (rad) by which a vector rotates if one coordinate changes by 1 rad
@@ -273,7 +279,7 @@ def _function_list(code: FrameCode) -> str:
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
 
-_VECTOR = '''
+_VECTOR_CHECK = '''
 def _demand(name, x, width):
     """Raise an error if an input is not a vector of `width` numbers."""
     found = tuple(x.shape) if hasattr(x, "shape") else (len(x),)
@@ -281,18 +287,18 @@ def _demand(name, x, width):
         raise ValueError(f"{name} needs {width} numbers: found the shape {found}")
 '''
 _LENGTH_MESSAGE = 'f"{x} needs {width} numbers: found {{len({x})}}"'
-_FUNCTIONS = ("cos", "sin", "sqrt")
+_MATH_FUNCTIONS = ("cos", "sin", "sqrt")
 _EVALUATE_EACH = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}), whose batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
-        helpers=_make_check('x.dtype.kind not in "biuf"', numbers="real numbers"),
+        helpers=_make_input_check('x.dtype.kind not in "biuf"', numbers="real numbers"),
         first_lines=_numpy_first_lines,
-        index="{}[..., {}]",
+        input_format="{}[..., {}]",
         result=_make_array_result("np.empty((*shape, {1}))", "..., "),
-        values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
+        values_body="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
     "array": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and\n"
@@ -301,13 +307,13 @@ DIALECTS = {
         imports="import numpy",
         helpers=_NAMESPACE
         + "\n"
-        + _make_check('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
+        + _make_input_check('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
         + "\n"
         + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
-        first_lines=_in_any_namespace,
-        index="{}[..., {}]",
+        first_lines=_array_first_lines,
+        input_format="{}[..., {}]",
         result=_make_stacked_result("xp, "),
-        values="arrays = [xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs]\n"
+        values_body="arrays = [xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs]\n"
         "    if arrays[0].dtype != getattr(xp, kind):\n"
         '        raise TypeError(f"the namespace makes {arrays[0].dtype} of {kind}; in JAX, first call "\n'
         "                        \"jax.config.update('jax_enable_x64', True)\")\n"
@@ -326,7 +332,7 @@ DIALECTS = {
             '"{x} needs {width} numbers"'
         ),  # Numba supports only constant messages.
         result=_make_array_result("np.empty({0})", ""),
-        values=_EVALUATE_EACH.format("function(*map(np.array, one)).ravel().tolist()"),
+        values_body=_EVALUATE_EACH.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
@@ -334,17 +340,17 @@ DIALECTS = {
         "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
-        helpers=_make_check("not jnp.issubdtype(x.dtype, jnp.floating)")
+        helpers=_make_input_check("not jnp.issubdtype(x.dtype, jnp.floating)")
         + "\n"
         + _STACKED.format(given="", xp="jnp", axis="axis"),
         first_lines=lambda writer: [
             *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
-            *_check_lines(writer),
+            *_input_check_lines(writer),
             _zero(writer, "jnp"),
         ],
-        index="{}[..., {}]",
+        input_format="{}[..., {}]",
         result=_make_stacked_result(""),
-        values='unfused, wide = {"xla_disable_hlo_passes": "fusion"}, jax.config.jax_enable_x64\n'
+        values_body='unfused, wide = {"xla_disable_hlo_passes": "fusion"}, jax.config.jax_enable_x64\n'
         '    jax.config.update("jax_enable_x64", True)  # otherwise JAX computes float64 in float32\n'
         "    try:\n"
         "        compiled = jax.jit(function, compiler_options=unfused)\n"
@@ -359,19 +365,19 @@ DIALECTS = {
         "whose batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
         "Kinematics() is a torch.nn.Module with these functions.",
         imports="import torch\nfrom torch import {}",
-        helpers=_make_check(
+        helpers=_make_input_check(
             "not x.is_floating_point()", array="a tensor", is_array="isinstance(x, torch.Tensor)"
         )
         + "\n"
         + _STACKED.format(given="", xp="torch", axis="dim"),
-        first_lines=lambda writer: [*_check_lines(writer), _zero(writer, "torch")],
-        index="{}[..., {}]",
+        first_lines=lambda writer: [*_input_check_lines(writer), _zero(writer, "torch")],
+        input_format="{}[..., {}]",
         result=_make_stacked_result(""),
-        values="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
+        values_body="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
         "    return function(*tensors).reshape(len(inputs[0]), -1).tolist()",
         check_parameter='device="cpu"',
         has_single_precision=True,
-        more_code=_torch_module,
+        more_code=_torch_module_code,
         more_checks="    for name, good in gradients().items():\n"
         "        wrong |= not good\n"
         '        print("good" if good else "WRONG", f"{name}: derivatives by gradcheck (float64)")\n',
@@ -380,10 +386,10 @@ DIALECTS = {
         about="Arguments are columns SX, MX or DM: q ({nq}), v and a ({nv}).\n"
         "A Hessian has {nv} times 6 rows.",
         imports="import casadi\nfrom casadi import {}",
-        helpers=_VECTOR,
-        first_lines=_check_lines,
+        helpers=_VECTOR_CHECK,
+        first_lines=_input_check_lines,
         result=_make_nested_result("casadi.vertcat(", ")", "casadi.horzcat({})"),
-        values=_EVALUATE_EACH.format(
+        values_body=_EVALUATE_EACH.format(
             "[float(x) for row in casadi.DM(function(*map(casadi.DM, one))).full().tolist() for x in row]"
         ),
     ),
@@ -393,7 +399,7 @@ DIALECTS = {
         imports="import sympy\nfrom sympy import {}",
         first_lines=_make_length_check(_LENGTH_MESSAGE),
         result=_make_nested_result("sympy.Matrix([", "])"),
-        values=_EVALUATE_EACH.format("[float(x) for x in function(*one)]"),
+        values_body=_EVALUATE_EACH.format("[float(x) for x in function(*one)]"),
     ),
     "sympy-exact": Dialect(
         about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
@@ -403,7 +409,7 @@ DIALECTS = {
         first_lines=_make_length_check(_LENGTH_MESSAGE),
         result=_make_nested_result("Matrix([", "])"),
         # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
-        values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
+        values_body='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
         '    numbers |= {"Rational": lambda x, y: mpmath.mpf(x) / y, "Matrix": mpmath.matrix}\n'
         "    with mpmath.workdps(60):\n"
         "        same = types.FunctionType(function.__code__, numbers)\n"
@@ -430,12 +436,12 @@ def write(code: FrameCode, to: str) -> str:
     lines += [_imports(code, dialect), "", *([dialect.helpers] if dialect.helpers else [])]
     for function in code.functions:
         lines += ["", *_function(code, function, dialect), ""]
-    return "\n".join([*lines, *_check(code, dialect), ""])
+    return "\n".join([*lines, *_self_test_lines(code, dialect), ""])
 
 
 def _imports(code: FrameCode, dialect: Dialect) -> str:
     nodes = [node.op for function in code.functions for node in function.nodes]
-    used = ", ".join(name for name in _FUNCTIONS if name in nodes)
+    used = ", ".join(name for name in _MATH_FUNCTIONS if name in nodes)
     lines = [line for line in dialect.imports.split("\n") if used or "{}" not in line]
     return "\n".join(lines).strip().format(used)
 
@@ -443,9 +449,9 @@ def _imports(code: FrameCode, dialect: Dialect) -> str:
 def _function(code: FrameCode, function: Function, dialect: Dialect) -> Iterator[str]:
     literal: Callable[[Number], str] = repr
     if dialect.exact:
-        from urdfkin.export.exact import format_literal
+        from urdfkin.export.exact import format_exact_literal
 
-        literal = format_literal
+        literal = format_exact_literal
     writer = Writer(code, function, literal)
     if dialect.decorator:
         yield dialect.decorator
@@ -455,14 +461,14 @@ def _function(code: FrameCode, function: Function, dialect: Dialect) -> Iterator
     yield f'    """({size}), eq. {numbers}; {function.operation_count} operations."""'
     yield from (f"    {line}" for line in dialect.first_lines(writer))
     for node in writer.inputs:
-        yield f"    {writer.names[node]} = {dialect.index.format(node.op, node.operands[0])}"
+        yield f"    {writer.names[node]} = {dialect.input_format.format(node.op, node.operands[0])}"
     for head, lines in writer.statements():
         yield f"    # {head}"
         yield from (f"    {name} = {value}" for name, value in lines)
     yield from (f"    {line}" for line in dialect.result(writer))
 
 
-_CHECK = '''
+_CHECK_TEMPLATE = '''
 {classes}def _values(function, inputs, kind{more}):
     {values}
 
@@ -497,11 +503,11 @@ if __name__ == "__main__":
 '''
 
 
-_DOUBLE_PRECISION = '[("float64", 2.0**-52, WITHIN)]'
-_BOTH_PRECISIONS = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
+_DOUBLE_TOLERANCES = '[("float64", 2.0**-52, WITHIN)]'
+_BOTH_TOLERANCES = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
 
 
-def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
+def _self_test_lines(code: FrameCode, dialect: Dialect) -> Iterator[str]:
     yield "\n# Test vectors: inputs, true values at fifty digits, and tolerances in eps = 2^-52."
     if dialect.has_single_precision:
         yield "# SINGLE contains tolerances in single precision, in eps = 2^-23."
@@ -530,9 +536,9 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
                 yield "        ],"
             yield "    ],"
         yield "}"
-    yield _CHECK.format(
-        values=dialect.values,
-        kinds=_BOTH_PRECISIONS if dialect.has_single_precision else _DOUBLE_PRECISION,
+    yield _CHECK_TEMPLATE.format(
+        values=dialect.values_body,
+        kinds=_BOTH_TOLERANCES if dialect.has_single_precision else _DOUBLE_TOLERANCES,
         told=" ({kind})" if dialect.has_single_precision else "",
         given=dialect.check_parameter,
         more=f", {dialect.check_parameter.partition('=')[0]}" if dialect.check_parameter else "",
@@ -542,7 +548,7 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
     ).rstrip()
 
 
-def torch_module(text: str) -> Any:
+def load_torch_module(text: str) -> Any:
     require_torch()
     scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
     exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)

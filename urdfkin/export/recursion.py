@@ -65,11 +65,11 @@ class TreeRecursion(Recursion):
         state = LinkState()
         for i in range(len(plan.steps)):
             kind.begin_step(i)
-            state = self._move(i, self._carry(state, plan.geometry[i].tolist()))
+            state = self._apply_joint_motion(i, self._apply_link_pose(state, plan.geometry[i].tolist()))
             self.states.append(state)
             kind.end_step(i, state)
         kind.begin_step(len(self.states))
-        self.end = self._carry(state, plan.offsets[0].tolist())
+        self.end = self._apply_link_pose(state, plan.offsets[0].tolist())
         kind.end_step(len(self.states), self.end)
         kind.begin_step(len(self.states) + 1)
 
@@ -77,7 +77,7 @@ class TreeRecursion(Recursion):
         self.turns.append(S)
         return super().rotate_frame(s, S)
 
-    def _carry(self, s: LinkState, row: Sequence[float]) -> LinkState:
+    def _apply_link_pose(self, s: LinkState, row: Sequence[float]) -> LinkState:
         R, d = row[: Geometry.OFFSET], row[Geometry.OFFSET : Geometry.MULTIPLIER]
         x, y, z = _without_rounding(R[0:3]), _without_rounding(R[3:6]), _without_rounding(R[6:9])
         return self.rotate_frame(self.translate_frame(s, _without_rounding(d)), (x, y, z))
@@ -86,7 +86,7 @@ class TreeRecursion(Recursion):
         found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0, 1)
         return found
 
-    def _move(self, i: int, s: LinkState) -> LinkState:
+    def _apply_joint_motion(self, i: int, s: LinkState) -> LinkState:
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         match motion := JointMotion(kind):
             case JointMotion.PLANAR:
@@ -211,7 +211,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-QUANTITIES: dict[str, Callable[[CompiledTree, NumberKind, Any, Reference], list[Number]]] = {
+QUANTITY_FUNCTIONS: dict[str, Callable[[CompiledTree, NumberKind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,
     "jacobian": jacobian,

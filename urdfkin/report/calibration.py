@@ -18,7 +18,7 @@ from urdfkin.system.documents import as_json_data
 #: If the user states no noise, the noise is estimated.
 #: The estimated noise is at least the rounding error.
 #: Below this `noise_ratio`, the report calls the residuals rounding errors.
-_ROUNDING = 0.5
+_ROUNDING_NOISE_RATIO = 0.5
 
 
 def document(calibration: Calibration) -> TextDocument:
@@ -41,9 +41,9 @@ def document(calibration: Calibration) -> TextDocument:
         rows = [
             (
                 str(calibration.parameters[k]),
-                _amount(calibration.changes[k], calibration.parameters[k].unit),
-                _amount(calibration.standard_deviations[k], calibration.parameters[k].unit),
-                _amount(calibration.written_changes[k], calibration.parameters[k].unit)
+                _format_value(calibration.changes[k], calibration.parameters[k].unit),
+                _format_value(calibration.standard_deviations[k], calibration.parameters[k].unit),
+                _format_value(calibration.written_changes[k], calibration.parameters[k].unit)
                 if k in calibration.written_parameters
                 else "",
             )
@@ -75,7 +75,7 @@ def document(calibration: Calibration) -> TextDocument:
     elif calibration.is_noise_stated:
         ratio = f"{full_fit.noise_ratio:.3g} +- {full_fit.noise_ratio_deviation:.2g}"
         parts.append(f"noise: {noise_text} as stated; the residuals are {ratio} times as large as this noise")
-    elif full_fit.noise_ratio < _ROUNDING:
+    elif full_fit.noise_ratio < _ROUNDING_NOISE_RATIO:
         parts.append("noise: none, the residuals are only rounding errors")
     else:
         parts.append(f"noise: {noise_text}, estimated from the residuals")
@@ -92,7 +92,7 @@ def displacement_table(written: UpdatedURDF) -> Table:
     return Table(["joint", "origin moved by", "rotated by"], rows)
 
 
-def _amount(value: float, unit: str) -> str:
+def _format_value(value: float, unit: str) -> str:
     if not np.isfinite(value):
         return "unknown"
     return length(value) if unit == "m" else angle(value) if unit == "rad" else f"{value:.3g}"

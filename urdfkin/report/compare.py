@@ -35,7 +35,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import format_axis, format_mimic_rule
-from urdfkin.report.markdown import LIMIT, count_within, row_line, shorten, table_lines
+from urdfkin.report.markdown import MAX_CHARACTERS, count_within, row_line, shorten, table_lines
 from urdfkin.report.words import (
     VERDICTS,
     check_name,
@@ -60,7 +60,7 @@ from urdfkin.verify.oracles import versions
 
 _MAX_LENGTH = 200
 #: Displayed poses are rounded to nine decimals.
-_PRECISION = Tolerance(1e-9, 1e-9)
+_DISPLAY_TOLERANCE = Tolerance(1e-9, 1e-9)
 
 
 def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Iterator[tuple[str, str, str]]:
@@ -95,7 +95,7 @@ def _joint_changes(was: ReportedJoint, now: ReportedJoint) -> Iterator[tuple[str
         Ts = [np.array(joint["placement"]) for joint in (was, now)]
         away = length(float(np.linalg.norm(Ts[1][:3, 3] - Ts[0][:3, 3])))
         rotation = angle(float(rotation_angle(Ts[0][:3, :3], Ts[1][:3, :3])))
-        first, second = (pose_words(T, _PRECISION) for T in Ts)
+        first, second = (pose_words(T, _DISPLAY_TOLERANCE) for T in Ts)
         yield "origin", first, f"{second}: moved by {away}, rotated by {rotation}"
     limits = [dict(joint["limit"] or {}) for joint in (was, now)]
     for entry in ("lower", "upper", "velocity", "effort"):
@@ -104,7 +104,7 @@ def _joint_changes(was: ReportedJoint, now: ReportedJoint) -> Iterator[tuple[str
             first, second = ("none" if bound is None else f"{bound:.12g}" for bound in bounds)
             yield f"{entry} limit", first, second
     if was["mimic"] != now["mimic"]:
-        yield "mimic rule", _rule(was), _rule(now)
+        yield "mimic rule", _mimic_rule(was), _mimic_rule(now)
 
 
 def _angle_between(first: Sequence[float] | None, second: Sequence[float] | None) -> str:
@@ -114,7 +114,7 @@ def _angle_between(first: Sequence[float] | None, second: Sequence[float] | None
     return f", rotated by {angle(float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))}"
 
 
-def _rule(joint: ReportedJoint) -> str:
+def _mimic_rule(joint: ReportedJoint) -> str:
     rule = joint["mimic"]
     return format_mimic_rule(rule["mimicked_joint"], rule["multiplier"], rule["offset"]) if rule else "none"
 
@@ -127,7 +127,9 @@ def document(old: Document, new: Document, comparison: ReportComparison) -> Text
     parts: list[str | Table] = [
         f"{title}: {one['started']}, {summary(one)}" for title, one in (("old", old), ("new", new))
     ]
-    rows = [[quantity_name(name), _cell(a), _cell(b)] for name, a, b in worst_by_quantity(old, new)]
+    rows = [
+        [quantity_name(name), _units_cell(a), _units_cell(b)] for name, a, b in worst_disagreements(old, new)
+    ]
     parts.append(Table(["worst, eps*scale", "old", "new"], rows))
     for change in sorted(comparison.changes, key=lambda change: not change.regression):
         parts.append(Strong(f"REGRESSION {change}", "bold red") if change.regression else str(change))
@@ -149,10 +151,13 @@ def _describe_exit(comparison: ReportComparison) -> str:
     return "exit 0: changes without a regression" if comparison.changes else "exit 0"
 
 
-def markdown_of(old: Document, new: Document, comparison: ReportComparison, limit: int = LIMIT) -> str:
+def markdown_of(
+    old: Document, new: Document, comparison: ReportComparison, max_characters: int = MAX_CHARACTERS
+) -> str:
     mark = "❌" if comparison.regressions else "✅"
     worst_rows = (
-        (text(quantity_name(name)), _cell(a), _cell(b)) for name, a, b in worst_by_quantity(old, new)
+        (text(quantity_name(name)), _units_cell(a), _units_cell(b))
+        for name, a, b in worst_disagreements(old, new)
     )
     lines = [
         f"## {mark} {verdict(comparison)[0].upper()}{verdict(comparison)[1:]}",
@@ -161,9 +166,9 @@ def markdown_of(old: Document, new: Document, comparison: ReportComparison, limi
         "",
         *(table_lines(["", "changed value", "old", "new"]) if comparison.changes else []),
     ]
-    limit_of_rows = limit - sum(len(line) + 1 for line in lines) - 100
+    row_characters = max_characters - sum(len(line) + 1 for line in lines) - 100
     rows = [_row(change) for change in sorted(comparison.changes, key=lambda change: not change.regression)]
-    shown = count_within(rows, limit_of_rows)
+    shown = count_within(rows, row_characters)
     lines += rows[:shown]
     if shown < len(rows):
         lines += ["", f"{format_count(len(rows) - shown, 'further change')} left out: the comment is full."]
@@ -177,7 +182,7 @@ def _row(change: ReportChange) -> str:
     return row_line([mark, *(text(shorten(cell, 300)) for cell in cells)])
 
 
-def _cell(value: Units | str) -> str:
+def _units_cell(value: Units | str) -> str:
     return value if isinstance(value, str) else format_units(value)
 
 
@@ -186,7 +191,7 @@ def _cell(value: Units | str) -> str:
 GROWTH_FACTOR = 2.0
 #: Growth is no regression if the new disagreement (in eps * scale) is below this number.
 #: A single rounding error can be this large.
-GROWTH_FLOOR = 2.0
+DISAGREEMENT_FLOOR = 2.0
 #: If the new ratio of disagreement to bound is below this number, its growth is not a regression.
 _BOUND_RATIO_FLOOR = 0.1
 
@@ -337,13 +342,13 @@ def find_renamed_files(
     - A is the only source with this name that the new report lacks.
     - B is the only source with this name that the old report lacks.
     """
-    gone, new = _by_name(before, after), _by_name(after, before)
+    gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1
     }
 
 
-def _by_name(
+def _missing_sources_by_name(
     robots: Mapping[str, ReportedRobot], others: Mapping[str, ReportedRobot]
 ) -> dict[str, list[str]]:
     named: dict[str, list[str]] = {}
@@ -415,7 +420,7 @@ def _bound_range(check: ReportedCheck) -> str:
     return " to ".join("none" if end is None else f"{end:g}" for end in check["bound"])
 
 
-def _has_grown(old: Units, new: Units, factor: float, floor: float = GROWTH_FLOOR) -> bool:
+def _has_grown(old: Units, new: Units, factor: float, floor: float = DISAGREEMENT_FLOOR) -> bool:
     if old is None:
         return False
     return new is None or (new > floor and new > factor * old)
@@ -434,11 +439,11 @@ def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[R
             yield ReportChange(source, key, str(before or ""), str(after or ""))
 
 
-def worst_by_quantity(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
+def worst_disagreements(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
     names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
-    return [(name, _worst(old, name), _worst(new, name)) for name in names]
+    return [(name, _worst_disagreement(old, name), _worst_disagreement(new, name)) for name in names]
 
 
-def _worst(document: Document, quantity: str) -> Units | str:
+def _worst_disagreement(document: Document, quantity: str) -> Units | str:
     checks = [c for robot in document["robots"] for c in robot["checks"] if c["quantity"] == quantity]
     return worst(check["worst"] for check in checks) if checks else ""

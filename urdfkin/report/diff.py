@@ -10,7 +10,7 @@ from urdfkin.comparison.diff import Changes, ModelChange, displacement_text, for
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
-from urdfkin.report.markdown import LIMIT, count_within, row_line, shorten, table_lines
+from urdfkin.report.markdown import MAX_CHARACTERS, count_within, row_line, shorten, table_lines
 from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
@@ -31,20 +31,20 @@ def headline(found: Changes) -> str:
     return f"{head}; together they {displacement_text(found.total)}"
 
 
-PAIRS = ("old", "new", "changes")
+PAIR_HEADS = ("old", "new", "changes")
 
 
 def pairs_document(found: Sequence[Changes]) -> TextDocument:
     rows = [(*one.sources, headline(one)) for one in found]
     return TextDocument(
-        "", [Table(PAIRS, rows, left=3), *(line for one in found if one for line in lines_of(one))]
+        "", [Table(PAIR_HEADS, rows, left=3), *(line for one in found if one for line in lines_of(one))]
     )
 
 
 def pairs_markdown(found: Sequence[Changes]) -> str:
-    lines = table_lines(PAIRS, (map(text, (*one.sources, headline(one))) for one in found))
+    lines = table_lines(PAIR_HEADS, (map(text, (*one.sources, headline(one))) for one in found))
     parts = ["\n".join([*lines, ""])]
-    parts += [markdown_of(one, LIMIT // len(found)) for one in found if one]
+    parts += [markdown_of(one, MAX_CHARACTERS // len(found)) for one in found if one]
     return "\n".join(parts)
 
 
@@ -80,12 +80,12 @@ def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]
     return rows
 
 
-def markdown_of(found: Changes, limit: int = LIMIT) -> str:
+def markdown_of(found: Changes, max_characters: int = MAX_CHARACTERS) -> str:
     lines = [f"## {text(headline(found))}", "", f"{text(found.sources[0])} → {text(found.sources[1])}", ""]
     if found:
         lines += table_lines(HEADS)
     rows = [row_line(map(text, cells)) for cells in rows_of(found, 120)]
-    shown = count_within(rows, limit - sum(map(len, lines)) - 200)
+    shown = count_within(rows, max_characters - sum(map(len, lines)) - 200)
     lines += rows[:shown]
     if shown < len(rows):
         lines += ["", f"{format_count(len(rows) - shown, 'more change')} not shown."]
@@ -93,7 +93,7 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
 
 
 def as_data(found: Changes) -> dict[str, Any]:
-    def far(interval: Any) -> dict[str, Any] | None:
+    def distance_entry(interval: Any) -> dict[str, Any] | None:
         if interval is None:
             return None
         return {"frame": interval.frame, "lower": interval.lower, "upper": interval.upper}
@@ -111,8 +111,8 @@ def as_data(found: Changes) -> dict[str, Any]:
             }
             for c in found.changes
         ],
-        "effects": [{"element": e.element, **(far(e.interval) or {})} for e in found.effects],
-        "total": far(found.total),
+        "effects": [{"element": e.element, **(distance_entry(e.interval) or {})} for e in found.effects],
+        "total": distance_entry(found.total),
         "rounding": found.rounding and dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
     return cast("dict[str, Any]", as_json_data(data))

@@ -14,11 +14,11 @@ import numpy as np
 
 from urdfkin.report.words import (
     checks_of_quantity,
+    disagreement_cell,
     format_units,
     quantities,
     quantity_name,
     worst,
-    worst_cell,
 )
 from urdfkin.validation.document import Chain, ReportedCheck, ReportedDHTable, ReportedModel, ReportedRobot
 from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 #: Left end of the x axis, in eps * scale.
 #: The percentage at the left end is the share of disagreements below the left end.
-_LEFT = 1e-2
+_X_AXIS_MIN = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
-_HEIGHT = 0.82
+_BAR_HEIGHT = 0.82
 
 
 def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> str:
@@ -47,7 +47,8 @@ def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> 
             _draw_row(axes, len(names) - 1 - row, checks_of_quantity(robot, name), np.asarray(edges), right)
         _decorate(axes, names, right)
         descriptions = (
-            f"{quantity_name(name)}: worst {worst_cell(checks_of_quantity(robot, name))}" for name in names
+            f"{quantity_name(name)}: worst {disagreement_cell(checks_of_quantity(robot, name))}"
+            for name in names
         )
         return inline_svg(
             figure,
@@ -68,17 +69,17 @@ def _draw_row(
 ) -> None:
     counts = np.sum([check["histogram"] for check in checks], axis=0)
     results = counts.sum()
-    first = int(np.searchsorted(edges, _LEFT))
+    first = int(np.searchsorted(edges, _X_AXIS_MIN))
     heights = counts[first + 1 :] / max(1, counts[first + 1 :].max())
     last = int(np.flatnonzero(heights).max(initial=-1)) + 1
-    axes.plot([_LEFT, edges[-1] * 10], [base, base], color=GRID, linewidth=0.7, zorder=1)
+    axes.plot([_X_AXIS_MIN, edges[-1] * 10], [base, base], color=GRID, linewidth=0.7, zorder=1)
     if last > 0:
         at = edges[first : first + last + 1]
-        tops = base + _HEIGHT * heights[: len(at) - 1]
+        tops = base + _BAR_HEIGHT * heights[: len(at) - 1]
         axes.stairs(tops, at, baseline=base, fill=True, color=FIRST, alpha=0.85, linewidth=0, zorder=3)
     exact = counts[: first + 1].sum() / results if results else 0.0
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
-    _draw_bound(axes, base, checks)
+    _draw_bound_range(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
     # A mark at the right end replaces results beyond the plot.
     if largest is None or largest > right:
@@ -92,10 +93,10 @@ def _draw_row(
 
 def _annotate_left(axes: Axes, text: str, y: float, points: float, **style: Any) -> None:
     place: dict[str, Any] = {"xytext": (-4, points), "textcoords": "offset points", "ha": "right"}
-    axes.annotate(text, (_LEFT, y), color=TEXT, **place, **style)
+    axes.annotate(text, (_X_AXIS_MIN, y), color=TEXT, **place, **style)
 
 
-def _draw_bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
+def _draw_bound_range(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
     lows = [low for low, _ in (check["bound"] for check in checks) if low is not None]
     highs = [high for _, high in (check["bound"] for check in checks) if high]
     if lows and highs:
@@ -108,7 +109,7 @@ def _draw_bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
 
 def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
     axes.set_xscale("log")
-    axes.set_xlim(_LEFT, right)
+    axes.set_xlim(_X_AXIS_MIN, right)
     axes.set_ylim(-0.15, len(names) - 0.05)
     axes.set_yticks(
         [len(names) - 1 - row for row in range(len(names))], [label(quantity_name(name)) for name in names]
@@ -125,7 +126,7 @@ def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
     axes.patch.set_visible(False)
 
 
-_KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
+_JOINT_KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 
 
 def scene(model: ReportedModel, chains: list[Chain]) -> dict[str, Any]:
@@ -133,7 +134,7 @@ def scene(model: ReportedModel, chains: list[Chain]) -> dict[str, Any]:
 
     The entry `joints` contains a list for each joint. The items of the list are:
 
-    - the name, and the index of the kind in `_KINDS`;
+    - the name, and the index of the kind in `_JOINT_KINDS`;
     - the indices of the parent link and of the child link;
     - the pose in the parent link: three rows of four numbers;
     - the axis (0: no axis), and the index in q (-1: no index);
@@ -164,14 +165,14 @@ def _joint(model: ReportedModel, i: int, links: dict[str, int]) -> list[Any]:
     limit, mimic = joint["limit"], joint["mimic"]
     return [
         joint["name"],
-        _KINDS.index(joint["kind"]),
+        _JOINT_KINDS.index(joint["kind"]),
         links[joint["parent"]],
         links[joint["child"]],
         _three_rows(joint["placement"]),
-        [_short(x) for x in joint["axis"]] if joint["axis"] else 0,
+        [_round_value(x) for x in joint["axis"]] if joint["axis"] else 0,
         -1 if joint["q"] is None else joint["q"],
-        None if limit is None or limit["lower"] is None else _short(limit["lower"]),
-        None if limit is None or limit["upper"] is None else _short(limit["upper"]),
+        None if limit is None or limit["lower"] is None else _round_value(limit["lower"]),
+        None if limit is None or limit["upper"] is None else _round_value(limit["upper"]),
         [joint["q"], mimic["multiplier"], mimic["offset"]] if mimic else 0,
     ]
 
@@ -183,7 +184,7 @@ def _table(table: ReportedDHTable, joints: dict[str, int]) -> dict[str, Any]:
         "rows": [
             [
                 joints[row["joint"]],
-                *(_short(row[key]) for key in ("a", "alpha", "beta", "d", "theta")),
+                *(_round_value(row[key]) for key in ("a", "alpha", "beta", "d", "theta")),
                 row["sense"],
             ]
             for row in table["rows"]
@@ -199,9 +200,9 @@ def _link(frame: str, links: dict[str, int], joints: dict[str, int]) -> int:
 
 
 def _three_rows(T: Sequence[Sequence[float]]) -> list[float | int]:
-    return [_short(x) for row in T[:3] for x in row]
+    return [_round_value(x) for row in T[:3] for x in row]
 
 
-def _short(value: float) -> float | int:
+def _round_value(value: float) -> float | int:
     rounded = float(f"{value:.7g}")
     return int(rounded) if rounded == int(rounded) else rounded

@@ -44,13 +44,13 @@ MARKED_RUNS, CHARTED_RUNS = 20, 60
 #: The page lists the latest changes first.
 #: A terminal shows at most this number of runs, and at most this number of changes.
 #: On a terminal, the option --all removes the limit.
-SHOWN = 20
+MAX_SHOWN = 20
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot.
 #: The key "" is for a run whose report does not contain the robot.
-MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
+VERDICT_MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
-_LOWEST = -3.0
+_MIN_LOG_RATIO = -3.0
 
 
 class ValidationRun(TypedDict):
@@ -165,7 +165,7 @@ def read_history(paths: Sequence[Path]) -> History:
     """
     history = History()
     before: Document | None = None
-    for file, report in _in_order(list(_files(paths)), history):
+    for file, report in _reports_in_order(list(_files(paths)), history):
         history.runs.append(_run(file, report, before))
         _add_robots(history, before, report)
         before = report
@@ -190,7 +190,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
     count = 0
     for path in paths:
         has_reports = is_folder(path) and not (path / "manifest.json").is_file()
-        for file in _in_folder(path) if has_reports else iter([path]):
+        for file in _reports_in_folder(path) if has_reports else iter([path]):
             count += 1
             if count > MOST_RUNS:
                 raise InputError(
@@ -201,7 +201,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
             yield file
 
 
-def _in_folder(folder: Path) -> Iterator[Path]:
+def _reports_in_folder(folder: Path) -> Iterator[Path]:
     """Yield the reports in a folder, ordered by name; links to folders are not followed."""
     seen = 0
     for place, folders, names in os.walk(folder):
@@ -221,7 +221,7 @@ def _in_folder(folder: Path) -> Iterator[Path]:
         yield from (here / name for name in sorted(names) if name.endswith(".json"))
 
 
-def _in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
+def _reports_in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
     """Yield reports in the order of start times.
 
     A file that is not a readable report is added to `history.unusable`. A second report of the same run is
@@ -230,7 +230,7 @@ def _in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Do
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
-            starts.append((*_start(path), path))
+            starts.append((*_read_start_time(path), path))
         except UrdfkinError as error:
             history.unusable.append(_make_unused(path, error))
     seen = dict[str, str]()
@@ -253,7 +253,7 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
     return {"file": str(path), "reason": str(error).removeprefix(f"{path}: ")}
 
 
-def _start(path: Path) -> tuple[float, str]:
+def _read_start_time(path: Path) -> tuple[float, str]:
     """Read the start time of a run from its report, and return it as a Unix time (s) and as text.
 
     If the report has no valid start time, the Unix time is infinite.
@@ -321,8 +321,8 @@ def _point(run: int, source: str, robot: ReportedRobot) -> Point:
 
 
 def document(history: History, *, all_: bool = False) -> TextDocument:
-    some = None if all_ else SHOWN
-    first = 0 if all_ else max(0, len(history.runs) - SHOWN)
+    max_shown = None if all_ else MAX_SHOWN
+    first = 0 if all_ else max(0, len(history.runs) - MAX_SHOWN)
     runs = [
         [
             f"{k}", _date(run), run["verdict"], f"{run['robots']:,}", f"{run['results']:,}",
@@ -339,7 +339,7 @@ def document(history: History, *, all_: bool = False) -> TextDocument:
             robot, verdict_marks(history, points), points[-1]["verdict"],
             format_units(points[-1]["worst"], compared=points[-1]["results"] > 0),
             _ratio_cell(points[-1]), f"{points[-1]['errors']}", f"{points[-1]['warnings']}",
-            f"{len(_changes_of(grouped, points))}",
+            f"{len(_robot_changes(grouped, points))}",
         ]
         for robot, points in history.robots.items()
     ]  # fmt: skip
@@ -347,7 +347,7 @@ def document(history: History, *, all_: bool = False) -> TextDocument:
     parts += ["", Table(heads, rows, left=(0, 1, 2))]
     lines = [
         (Strong(words, "bold red") if change["regression"] else words)
-        for run, change in list_changes(history)[:some]
+        for run, change in list_changes(history)[:max_shown]
         for words in [f"run {run + 1}, {describe_change(change)}"]
     ]
     more = len(list_changes(history)) - len(lines)
@@ -376,7 +376,7 @@ def headline(history: History) -> str:
 
 
 def verdict_marks(history: History, points: Sequence[Point]) -> str:
-    return "".join(MARKS[verdict] for verdict in _latest_verdicts(history, points))
+    return "".join(VERDICT_MARKS[verdict] for verdict in _latest_verdicts(history, points))
 
 
 def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
@@ -401,7 +401,7 @@ def _changes_by_source(history: History) -> ChangesBySource:
     return grouped
 
 
-def _changes_of(grouped: ChangesBySource, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
+def _robot_changes(grouped: ChangesBySource, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
     sources = dict.fromkeys(point["source"] for point in points)
     return [one for source in sources for one in grouped.get(source, [])]
 
@@ -434,11 +434,11 @@ def as_html(history: History, command: str | None = None) -> str:
         stacks=_stacks(history),
         height=_height,
         robots=[_robot(history, robot, points, grouped) for robot, points in history.robots.items()],
-        changes=list_changes(history)[:SHOWN],
+        changes=list_changes(history)[:MAX_SHOWN],
         total=len(list_changes(history)),
         unusable=history.unusable,
         repeated=history.repeated,
-        marks=MARKS,
+        marks=VERDICT_MARKS,
         listed=_MAX_LISTED,
         units=format_units,
         share=_ratio_cell,
@@ -467,11 +467,11 @@ def _height(ratio: Units) -> float:
     """
     if ratio is None or ratio >= 1.0:
         return 100.0
-    return max(2.0, 100.0 * (1.0 - math.log10(ratio) / _LOWEST)) if ratio else 2.0
+    return max(2.0, 100.0 * (1.0 - math.log10(ratio) / _MIN_LOG_RATIO)) if ratio else 2.0
 
 
 def _robot(history: History, robot: str, points: Sequence[Point], grouped: ChangesBySource) -> dict[str, Any]:
-    verdicts, own_changes = _latest_verdicts(history, points), _changes_of(grouped, points)
+    verdicts, own_changes = _latest_verdicts(history, points), _robot_changes(grouped, points)
     return {
         "name": robot,
         "points": points[: -_MAX_LISTED - 1 : -1],

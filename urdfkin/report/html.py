@@ -26,6 +26,7 @@ from urdfkin.report.words import (
     bound_ratio_of,
     check_name,
     checks_in_order,
+    disagreement_cell,
     format_count,
     format_ratio,
     format_units,
@@ -39,7 +40,6 @@ from urdfkin.report.words import (
     utc,
     verdict_counts,
     worst,
-    worst_cell,
 )
 from urdfkin.system.lazy_import import install_command
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
@@ -56,14 +56,14 @@ if TYPE_CHECKING:
 
 #: Readers can open and close the details of a robot.
 #: Up to this number of robots, all details are open at first.
-_OPEN = 1
+_MAX_OPEN_ROBOTS = 1
 #: Maximum number of unverified robots whose details the page shows at first.
-_FAILURES_OPEN = 20
+_MAX_OPEN_FAILURES = 20
 #: If a report has more robots than this number, verified robots have no histograms.
 #: The histograms of one robot take a second of computing time.
 _MAX_DRAWN = 100
 #: If the details of all robots have more characters than this number, each robot has a separate file.
-MOST = 5_000_000
+MAX_PAGE_CHARACTERS = 5_000_000
 
 
 @cache
@@ -108,9 +108,9 @@ def as_html(document: Document) -> str:
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
     """Yield the path and the text of each file.
 
-    Paths are relative to the page. The page is the last file. If all details together are longer than `MOST`
-    characters, each robot has its own file in a folder. For example, the page `report.html` has the folder
-    `report-robots`.
+    Paths are relative to the page. The page is the last file. If all details together are longer than
+    `MAX_PAGE_CHARACTERS` characters, each robot has its own file in a folder. For example, the page
+    `report.html` has the folder `report-robots`.
     """
     document = _worst_first(document)
     robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"
@@ -120,10 +120,10 @@ def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
         details = _details(_robot(robot, i, document), document)
         size += len(details)
         waiting.append((f"{folder}/{i}.js", f"urdfkinRobot({json.dumps([token, i, details])});\n"))
-        if size > MOST:
+        if size > MAX_PAGE_CHARACTERS:
             yield from waiting
             waiting.clear()
-    if size <= MOST:
+    if size <= MAX_PAGE_CHARACTERS:
         yield name, as_html(document)
         return
     beside = ({"file": f"{folder}/{i}.js", "opened": False} for i in range(len(robots)))
@@ -137,7 +137,7 @@ def _worst_first(document: Document) -> Document:
 
 def _details(robot: dict[str, Any], document: Document) -> str:
     template = environment().get_template("details.html.j2")
-    return template.render(robot=robot, document=document, heat_steps=pages.HEAT_STEPS)
+    return template.render(robot=robot, document=document, heat_steps=pages.HEAT_EDGES)
 
 
 def _page(document: Document, robots: list[dict[str, Any]], token: str = "", folder: str = "") -> str:
@@ -152,13 +152,13 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
         compared=compared_titles(),
         not_compared=uncompared_titles(),
         totals=_totals(document),
-        model=_model_verdict(document),
+        model=_linter_verdict(document),
         verdicts=verdict_counts(document),
         quantities=list(quantities),
-        overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
+        overview=[pages.overview_row(robot, list(quantities.values())) for robot in document["robots"]],
         robots=robots,
-        opened=len(robots) <= _OPEN,
-        heat_steps=pages.HEAT_STEPS,
+        opened=len(robots) <= _MAX_OPEN_ROBOTS,
+        heat_steps=pages.HEAT_EDGES,
         token=token,
         folder=folder,
         script=as_is(asset("report.js")),
@@ -169,8 +169,14 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: ReportedRobot, index: int) -> dict[str, Any]:
-    opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
-    return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
+    opened = robot["verdict"] != "verified" and index < _MAX_OPEN_FAILURES
+    return {
+        "index": index,
+        "data": robot,
+        "summary": pages.overview_row(robot, []),
+        "file": "",
+        "opened": opened,
+    }
 
 
 def _totals(document: Document) -> dict[str, Any]:
@@ -182,12 +188,12 @@ def _totals(document: Document) -> dict[str, Any]:
         "frames": sum(len(robot["frames"]) for robot in robots),
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
-        "worst": worst_cell(checks),
+        "worst": disagreement_cell(checks),
         "share": format_ratio(worst(map(bound_ratio_of, robots))) if checks else "",
     }
 
 
-def _model_verdict(document: Document) -> dict[str, Any]:
+def _linter_verdict(document: Document) -> dict[str, Any]:
     severities = ("error", "warning", "note")
     found = [
         Counter[str](finding["severity"] for finding in robot["findings"]) for robot in document["robots"]

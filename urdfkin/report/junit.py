@@ -48,7 +48,7 @@ def _bytes(root: ET.Element) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
+def function_checks_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
     """Return JUnit XML with a test case for each function.
 
     A test case also fails if no oracle could check urdfkin's results.

@@ -35,7 +35,7 @@ def print_table(out: Console, table: Table) -> None:
     from rich.cells import cell_len
 
     ascii_only = out.options.ascii_only
-    heads, rows, widths = _cells(table)
+    heads, rows, widths = _cells_and_widths(table)
     roomy = fits(out, table)
     gap = "  " if roomy else " "
     if not roomy:
@@ -63,10 +63,10 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
+    return sum(width + 2 for width in _cells_and_widths(table)[2]) - 1 <= out.width
 
 
-def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
+def _cells_and_widths(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
     from rich.cells import cell_len
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")

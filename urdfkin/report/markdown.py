@@ -15,18 +15,18 @@ from urdfkin.report.words import (
     format_count,
     format_units,
     quantities_by_heading,
+    quantities_disagreement_cell,
     second_oracle_heads,
     second_oracle_rows,
     second_oracle_title,
     summary,
-    worst_cell_of_quantities,
 )
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 
 #: GitHub accepts comments of up to 65,536 characters.
-LIMIT = 60_000
-_MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
-_SHOWN = 3
+MAX_CHARACTERS = 60_000
+_VERDICT_MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
+_MAX_FAILED_CHECKS = 3
 
 
 def as_markdown(document: Document) -> str:
@@ -57,7 +57,7 @@ def as_markdown(document: Document) -> str:
         "",
     ]
     robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))
-    room = LIMIT - len("\n".join(head + foot))
+    room = MAX_CHARACTERS - len("\n".join(head + foot))
     return "\n".join(head + _body(robots, room) + foot)
 
 
@@ -100,9 +100,9 @@ def _cells(robot: ReportedRobot, quantities: list[tuple[str, ...]]) -> list[str]
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
-        *(worst_cell_of_quantities(robot, names) for names in quantities),
+        *(quantities_disagreement_cell(robot, names) for names in quantities),
         bound_ratio_cell(robot),
-        f"{_MARKS[verdict]} {verdict}",
+        f"{_VERDICT_MARKS[verdict]} {verdict}",
     ]
 
 
@@ -111,7 +111,7 @@ def _details(robot: ReportedRobot) -> list[str]:
     if robot["reason"]:
         lines += ["", f"**{markdown_code(robot['source'])}**: {text(shorten(robot['reason'], 600))}"]
     failed = [check for check in robot["checks"] if check["failed"]]
-    for check in failed[:_SHOWN]:
+    for check in failed[:_MAX_FAILED_CHECKS]:
         lines += [
             "",
             f"**{markdown_code(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
@@ -119,8 +119,11 @@ def _details(robot: ReportedRobot) -> list[str]:
         ]
         if check["worst_case"] is not None:
             lines += ["", fence_code(shorten(check["worst_case"]["replay"], 4000))]
-    if len(failed) > _SHOWN:
-        lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {markdown_code(robot['source'])}"]
+    if len(failed) > _MAX_FAILED_CHECKS:
+        lines += [
+            "",
+            f"... and {len(failed) - _MAX_FAILED_CHECKS} more quantities of {markdown_code(robot['source'])}",
+        ]
     return lines
 
 

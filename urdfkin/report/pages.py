@@ -15,16 +15,16 @@ from urdfkin.report.words import (
     bound_ratio_of,
     checks_in_order,
     checks_of_quantities,
+    disagreement_cell,
     error_cells,
     format_count,
     format_ratio,
     format_units,
     more_accurate,
     quantities_by_heading,
+    quantities_disagreement_cell,
     quantity_name,
     worst,
-    worst_cell,
-    worst_cell_of_quantities,
 )
 from urdfkin.validation.document import (
     Chain,
@@ -38,10 +38,10 @@ from urdfkin.validation.document import (
     Units,
 )
 
-_READABLE = DisplayUnits(digits=6)
+_DISPLAY_UNITS = DisplayUnits(digits=6)
 
 #: The heat map shows ratios of disagreement to bound. The colour changes at each of these ratios.
-HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
+HEAT_EDGES = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class HeatCell:
     step: int
 
 
-def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
+def overview_row(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
     checks = robot["checks"]
     largest, ratio = worst(check["worst"] for check in checks), bound_ratio_of(robot)
     return {
@@ -61,16 +61,19 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
         "results": robot["results"],
         "failed": robot["failed"],
         "quantities": [
-            (worst_cell_of_quantities(robot, names), _key(robot, names)) for names in quantities_of
+            (quantities_disagreement_cell(robot, names), _disagreement_sort_key(robot, names))
+            for names in quantities_of
         ],
-        "worst": worst_cell(checks),
+        "worst": disagreement_cell(checks),
         "worst_key": _sortable(largest) if checks else -1.0,
         "share": bound_ratio_cell(robot),
         "share_key": _sortable(ratio) if checks else -1.0,
         "findings": ", ".join(
-            format_count(count, word) for word in ("error", "warning") if (count := _findings(robot, word))
+            format_count(count, word)
+            for word in ("error", "warning")
+            if (count := _count_findings(robot, word))
         ),
-        "findings_key": 1e6 * _findings(robot, "error") + _findings(robot, "warning"),
+        "findings_key": 1e6 * _count_findings(robot, "error") + _count_findings(robot, "warning"),
         "seconds": robot["seconds"],
     }
 
@@ -83,11 +86,11 @@ def reason(robot: ReportedRobot) -> str:
     return "\n".join([first, *others])
 
 
-def _findings(robot: ReportedRobot, severity: str) -> int:
+def _count_findings(robot: ReportedRobot, severity: str) -> int:
     return sum(finding["severity"] == severity for finding in robot["findings"])
 
 
-def _key(robot: ReportedRobot, names: Sequence[str]) -> float:
+def _disagreement_sort_key(robot: ReportedRobot, names: Sequence[str]) -> float:
     checks = checks_of_quantities(robot, names)
     return _sortable(worst(check["worst"] for check in checks)) if checks else -1.0
 
@@ -159,13 +162,19 @@ def heat_map(
     own = _columns(model)
     rows = []
     for joint in robot["joints"]:
-        where = {
+        subject_indices = {
             "frames": [frame[f"joint:{joint}"]] if f"joint:{joint}" in frame else [],
             "joints": [moving[joint]],
             "columns": own.get(joint, []),
         }
         rows.append(
-            (joint, [_cell(checks_of_quantities(robot, names), where) for names in quantities_of.values()])
+            (
+                joint,
+                [
+                    _heat_cell(checks_of_quantities(robot, names), subject_indices)
+                    for names in quantities_of.values()
+                ],
+            )
         )
     return list(quantities_of), rows
 
@@ -181,15 +190,15 @@ def _columns(model: ReportedModel) -> dict[str, list[int]]:
     return own
 
 
-def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatCell:
-    found = [check["worst_by_subject"][i] for check in checks for i in where[check["subjects"]]]
+def _heat_cell(checks: Sequence[ReportedCheck], subject_indices: dict[str, list[int]]) -> HeatCell:
+    found = [check["worst_by_subject"][i] for check in checks for i in subject_indices[check["subjects"]]]
     if not found:
         return HeatCell("", 0)
     largest = worst(found)
     if largest is None:
-        return HeatCell("not finite", len(HEAT_STEPS) + 1)
-    ratio = max(_bound_ratio(check, i) for check in checks for i in where[check["subjects"]])
-    return HeatCell(format_units(largest), sum(ratio > edge for edge in HEAT_STEPS) + (ratio > 0.0))
+        return HeatCell("not finite", len(HEAT_EDGES) + 1)
+    ratio = max(_bound_ratio(check, i) for check in checks for i in subject_indices[check["subjects"]])
+    return HeatCell(format_units(largest), sum(ratio > edge for edge in HEAT_EDGES) + (ratio > 0.0))
 
 
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
@@ -232,12 +241,12 @@ def _dh_cells(row: ReportedDHRow, beta: bool) -> list[str]:
 
 
 def _length(metres: float) -> str:
-    return _READABLE.format_length(metres).replace("-", "−")
+    return _DISPLAY_UNITS.format_length(metres).replace("-", "−")
 
 
 def angle(radians: float) -> str:
     """Format an angle; an exact multiple of pi/12 is written with π."""
-    return _READABLE.format_angle(radians, pi="π").replace("-", "−")
+    return _DISPLAY_UNITS.format_angle(radians, pi="π").replace("-", "−")
 
 
 def accuracy_rows(study: ReportedAccuracy) -> list[dict[str, Any]]:

@@ -34,10 +34,12 @@ from urdfkin.validation.robot_summary import chain_disagreement, reader_disagree
 
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
 #: nq and nv of each kind of joint.
-_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
+_COORDINATE_COUNTS = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(
+    _WITH_AXIS, (1, 1)
+)
 #: Tolerance of rotation matrices and unit axes.
 #: A robot file may have only 6 digits.
-_ROUNDED = 1e-5
+_ROTATION_TOLERANCE = 1e-5
 
 
 def frame_names(model: ReportedModel) -> list[str]:
@@ -50,7 +52,7 @@ def moving_names(model: ReportedModel) -> list[str]:
 
 def column_names(model: ReportedModel) -> list[str]:
     """Return the joint name of each column, for Jacobians in which mimic joints have their own columns."""
-    return [joint["name"] for joint in model["joints"] for _ in range(_SIZES[joint["kind"]][1])]
+    return [joint["name"] for joint in model["joints"] for _ in range(_COORDINATE_COUNTS[joint["kind"]][1])]
 
 
 def model_contradictions(model: ReportedModel, chains: Sequence[Chain]) -> Iterator[str]:
@@ -87,7 +89,7 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
     where, axis, mimic = f"`model`: joint {joint['name']}", joint["axis"], joint["mimic"]
     if (axis is not None) != (joint["kind"] in _WITH_AXIS):
         yield f"{where}: a {joint['kind']} joint must {'not ' if axis else ''}have an axis"
-    elif axis is not None and abs(math.hypot(*axis) - 1.0) > _ROUNDED:
+    elif axis is not None and abs(math.hypot(*axis) - 1.0) > _ROTATION_TOLERANCE:
         yield f"{where}: axis {axis} is not a unit vector"
     rows = joint["placement"]
     R = [row[:3] for row in rows[:3]]
@@ -96,7 +98,7 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
         for i in range(3)
         for j in range(i + 1)
     ]
-    if rows[3] != [0.0, 0.0, 0.0, 1.0] or max(errors) > _ROUNDED:
+    if rows[3] != [0.0, 0.0, 0.0, 1.0] or max(errors) > _ROTATION_TOLERANCE:
         yield f"{where}: its placement is not a rigid transform"
     if mimic is not None:
         mimicked_joint = next((other for other in joints if other["name"] == mimic["mimicked_joint"]), None)
@@ -116,7 +118,7 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
         if joint["mimic"] is None:
-            nq, nv = _SIZES[joint["kind"]]
+            nq, nv = _COORDINATE_COUNTS[joint["kind"]]
             places[joint["name"]] = (q, v) if nq else (None, None)
             q, v = q + nq, v + nv
     for joint in model["joints"]:
@@ -136,7 +138,7 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
 _TOLERANCE = 1e-9
 #: Maximum number of results.
 #: A double represents all integers up to this number.
-_MOST = 2**53
+_MAX_RESULTS = 2**53
 
 
 def contradictions(document: Document) -> Iterator[str]:
@@ -237,7 +239,7 @@ def _check(
     check: ReportedCheck, subjects: list[str], robot: ReportedRobot, document: Document
 ) -> Iterator[str]:
     results, histogram, edges = check["results"], check["histogram"], document["histogram_edges"]
-    if results != robot["samples"] * len(subjects) or results > _MOST:
+    if results != robot["samples"] * len(subjects) or results > _MAX_RESULTS:
         yield (
             f"`results` is {results}, but there are {robot['samples']} samples of {len(subjects)}"
             f" {check['subjects']}"
@@ -257,14 +259,14 @@ def _check(
             f" {worst(check['worst_by_subject'])}"
         )
     last = max((i for i, count in enumerate(histogram) if count), default=0)
-    if results and last != histogram_bin(_as_number(check["worst"]), edges):
+    if results and last != histogram_bin(_none_as_infinity(check["worst"]), edges):
         yield (
             f"`worst` is {check['worst']}, but the last bin of `histogram` with results does not contain this"
             " value"
         )
     for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
-        computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
-        if not math.isclose(_as_number(stated), computed, rel_tol=_TOLERANCE):
+        computed = percentile(histogram, edges, _none_as_infinity(check["worst"]), percent)
+        if not math.isclose(_none_as_infinity(stated), computed, rel_tol=_TOLERANCE):
             yield f"`{name}` is {stated}, but the histogram gives {computed:g}"
     yield from _check_bound_ratio(check)
     yield from _case(check, subjects, robot, document["samples"] + SPECIAL_SAMPLES)
@@ -275,8 +277,8 @@ def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
 
     `bound_ratio` must lie between two quotients: `worst` / largest bound, and `worst` / smallest bound.
     """
-    ratio, largest = _as_number(check["bound_ratio"]), _as_number(check["worst"])
-    low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
+    ratio, largest = _none_as_infinity(check["bound_ratio"]), _none_as_infinity(check["worst"])
+    low, high = _none_as_infinity(check["bound"][0]), _none_as_infinity(check["bound"][1])
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
@@ -308,12 +310,12 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
         for name, units in zip(subjects, check["worst_by_subject"], strict=True)
         if name == case["frame"]
     )
-    if _as_number(case["disagreement"]) > _as_number(of_frame):
+    if _none_as_infinity(case["disagreement"]) > _none_as_infinity(of_frame):
         yield (
             f"`worst_case` has {case['disagreement']} at {case['frame']}, but the worst disagreement at"
             f" {case['frame']} is {of_frame}"
         )
-    ratio, units = _as_number(check["bound_ratio"]), _as_number(case["disagreement"])
+    ratio, units = _none_as_infinity(check["bound_ratio"]), _none_as_infinity(case["disagreement"])
     low, high = (ratio * (bound or 0.0) for bound in check["bound"])
     if math.isfinite(units) and not low * (1 - _TOLERANCE) <= units <= high * (1 + _TOLERANCE):
         yield f"`worst_case`: the disagreement {units:g} is not {ratio:g} times a bound"
@@ -327,11 +329,11 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
         yield f"`worst_case`: there is no sample {case['sample']} among {samples} samples"
 
 
-def _as_number(units: Units) -> float:
+def _none_as_infinity(units: Units) -> float:
     return math.inf if units is None else units
 
 
-_SHOWN = 3
+_MAX_CONTRADICTIONS = 3
 
 
 def read_document(path: Path) -> Document:
@@ -346,12 +348,12 @@ def read_stored_document(folder: Path) -> Document:
 
 def check_document(data: object, where: str) -> Document:
     document = VALIDATION.validate(data, where)
-    if against := list(islice(contradictions(document), _SHOWN + 1)):
-        more = " ..." if len(against) > _SHOWN else ""
+    if against := list(islice(contradictions(document), _MAX_CONTRADICTIONS + 1)):
+        more = " ..." if len(against) > _MAX_CONTRADICTIONS else ""
         raise InputError(
             "the report contradicts itself",
             where=where,
-            found="; ".join(against[:_SHOWN]) + more,
+            found="; ".join(against[:_MAX_CONTRADICTIONS]) + more,
             remedy=f"make the report again: {VALIDATION.command}",
         )
     return document

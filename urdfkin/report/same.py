@@ -34,21 +34,21 @@ from urdfkin.robot import Robot
 
 #: Maximum number of printed lines for each kind of difference.
 #: The option --all removes the limit.
-SHOWN = 12
+MAX_LINES = 12
 #: Message for models that are not the same, if joint names or orders differ.
-GUESSED = (
+MATCHED_BY_AXES = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
 #: Distances and angles up to a limit are not printed.
-#: The limit is FACTOR times the bound on rounding errors.
+#: The limit is `ROUNDING_FACTOR` times the bound on rounding errors.
 #: The factor covers the rounding errors of sums of several terms.
-FACTOR = 1.001
+ROUNDING_FACTOR = 1.001
 #: Heading of a list of mimicked joints.
 #: Each listed joint can move a mimic joint beyond the mimic joint's limits.
-NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
+MIMIC_LIMITS_HEADING = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
 def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
@@ -57,22 +57,27 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if sameness.unlimited:
         besides += f"; this result holds if {TRAVEL_CONDITION}"
     if question.within is not None:
-        return _within(sameness, question.within) + besides
+        return _within_headline(sameness, question.within) + besides
     off = "the distance of the frames has no bound"
     if math.isfinite(max(sameness.bound_as_written)):
-        off = f"in every configuration no frame is off by more than {_both(*sameness.bound_as_written)}"
+        bound = _length_and_angle(*sameness.bound_as_written)
+        off = f"in every configuration no frame is off by more than {bound}"
     if sameness.up_to_single:
         cause = "the difference of each joint is at most the rounding error of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if sameness.within_single and sameness.single is not None:
-        single = f"rounding to single precision can move a frame by up to {_both(*sameness.single)}"
+        single = (
+            f"rounding to single precision can move a frame by up to {_length_and_angle(*sameness.single)}"
+        )
         return f"DIFFERS WITHIN SINGLE PRECISION: {off}; {single}, but {sameness.unexplained[0]}{besides}"
     if sameness.verdict is Verdict.DIFFERS:
-        by = _by(sameness.frames, sameness.rounding)
+        by = _describe_largest_distance(sameness.frames, sameness.rounding)
         if sameness.frames and not by:
             by = ", although the common frames differ only by rounding errors"
         single = (
-            "" if sameness.single is None else f"; single precision explains up to {_both(*sameness.single)}"
+            ""
+            if sameness.single is None
+            else f"; single precision explains up to {_length_and_angle(*sameness.single)}"
         )
         single += f", but {sameness.unexplained[0]}" if single and sameness.unexplained else ""
         return f"DIFFERS{by}; first difference: {sameness.differences[0].words}{single}{besides}"
@@ -84,41 +89,43 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     return f"EQUIVALENT up to {', '.join(sameness.up_to)}: in every configuration {off}{written}{besides}"
 
 
-def _within(sameness: Sameness, most: float) -> str:
-    limit = f"WITHIN {most:g} m and rad, without changes of model B: "
-    if sameness.within(most):
-        return f"{limit}no frame is ever off by more than {_both(*sameness.bound_as_written)}"
+def _within_headline(sameness: Sameness, limit: float) -> str:
+    prefix = f"WITHIN {limit:g} m and rad, without changes of model B: "
+    if sameness.within(limit):
+        return f"{prefix}no frame is ever off by more than {_length_and_angle(*sameness.bound_as_written)}"
     if (
-        beyond := next(
+        unbounded := next(
             (one for one in sameness.differences if one.what not in BOUNDED_DIFFERENCE_KINDS), None
         )
     ) is not None:
-        return f"NOT {limit}{beyond.words}"
+        return f"NOT {prefix}{unbounded.words}"
     frames = (sameness.as_written,) if sameness.as_written is not None else sameness.frames
-    far = [one for one in frames if one.lower > most or one.radians_seen > most]
-    if far:
-        worst = max(far, key=lambda one: (one.lower, one.radians_seen))
-        return f"NOT {limit}{worst.frame} is {_off(worst, sameness.rounding)} off"
-    return f"NOT {limit}the proven bound is {_both(*sameness.bound_as_written)}"
+    beyond_limit = [one for one in frames if one.lower > limit or one.radians_seen > limit]
+    if beyond_limit:
+        worst = max(beyond_limit, key=lambda one: (one.lower, one.radians_seen))
+        return f"NOT {prefix}{worst.frame} is {_describe_distance(worst, sameness.rounding)} off"
+    return f"NOT {prefix}the proven bound is {_length_and_angle(*sameness.bound_as_written)}"
 
 
-def _both(metres: float, radians: float) -> str:
+def _length_and_angle(metres: float, radians: float) -> str:
     return f"{length(metres)} and {angle(radians)}"
 
 
-def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
+def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
     """Describe the largest distance and the largest angle between matching frames.
 
     The text contains no distance and no angle that rounding errors can explain.
     """
 
-    def largest(end: str) -> float:
-        return max((getattr(frame, end) for frame in frames), default=0.0)
+    def largest_value(attribute: str) -> float:
+        return max((getattr(frame, attribute) for frame in frames), default=0.0)
 
-    upper, radians = largest("upper"), largest("radians")
+    upper, radians = largest_value("upper"), largest_value("radians")
     parts: list[tuple[Callable[[float], str], float, float]] = []
-    parts += [(length, largest("lower"), upper)] if upper > FACTOR * rounding[0] else []
-    parts += [(angle, largest("radians_seen"), radians)] if radians > FACTOR * rounding[1] else []
+    parts += [(length, largest_value("lower"), upper)] if upper > ROUNDING_FACTOR * rounding[0] else []
+    parts += (
+        [(angle, largest_value("radians_seen"), radians)] if radians > ROUNDING_FACTOR * rounding[1] else []
+    )
     if any(math.isinf(most) for _, _, most in parts):
         least = " and ".join(f"{words(low)} or more" for words, low, _ in parts if low)
         return f" by {least} (no bound is proven)" if least else ", and no bound is proven"
@@ -129,13 +136,17 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
     return f" by {', and '.join(texts)}" if texts else ""
 
 
-def _off(frame: Interval, rounding: tuple[float, float]) -> str:
+def _describe_distance(frame: Interval, rounding: tuple[float, float]) -> str:
     """Describe the distance and the angle between two matching frames.
 
     The text contains no distance and no angle that rounding errors can explain.
     """
-    parts = [interval_text(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
-    if frame.radians > FACTOR * rounding[1]:
+    parts = (
+        [interval_text(length, frame.lower, frame.upper)]
+        if frame.upper > ROUNDING_FACTOR * rounding[0]
+        else []
+    )
+    if frame.radians > ROUNDING_FACTOR * rounding[1]:
         parts.append(interval_text(angle, frame.radians_seen, frame.radians))
     return " and ".join(parts)
 
@@ -169,7 +180,7 @@ def describe_as_written(sameness: Sameness) -> str:
     empty, which means that no change brings model B closer to model A.
     """
     frame = sameness.as_written
-    off = "" if frame is None else _off(frame, sameness.rounding)
+    off = "" if frame is None else _describe_distance(frame, sameness.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
 
 
@@ -201,39 +212,43 @@ def describe_renames(sameness: Sameness) -> list[str]:
         for names in sameness.orders
     ]
     if (guessed or sameness.orders) and not sameness:
-        joints = [GUESSED, *joints]
+        joints = [MATCHED_BY_AXES, *joints]
     return joints + [f"link {name_a} is {name_b}" for name_a, name_b in sameness.links if name_a != name_b]
 
 
 def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
     """Return the verdict on two models, with the differences and changes that explain the verdict.
 
-    Without `all_`, the document has at most `SHOWN` lines of each kind.
+    Without `all_`, the document has at most `MAX_LINES` lines of each kind.
     """
-    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(sameness), strict=True)]
+    parts: list[str | Table] = [
+        f"{k}: {name}" for k, name in zip("AB", _names_with_sources(sameness), strict=True)
+    ]
     head = headline(sameness, question)
     parts.append(Strong(head, "bold green" if sameness.holds(question) else "bold red"))
-    some = None if all_ else SHOWN
-    after, words = _reasons(sameness, all_=all_)
-    parts += _lines("changes of B", after, some)
+    max_lines = None if all_ else MAX_LINES
+    after, words = _changes_and_differences(sameness, all_=all_)
+    parts += _lines("changes of B", after, max_lines)
     if after and describe_as_written(sameness) not in head:
-        parts += _lines("", [describe_as_written(sameness)], some)
-    parts += _lines("differences", words[1:] if words and words[0] in head else words, some)
+        parts += _lines("", [describe_as_written(sameness)], max_lines)
+    parts += _lines("differences", words[1:] if words and words[0] in head else words, max_lines)
     frames = far_frames(sameness)
     if frames:
         parts.append(f"{frames_heading(sameness).lower()}:")
         parts += [
-            Table(HEADS, frame_rows(frames[:some])),
-            *_rest(len(frames), some),
+            Table(HEADS, frame_rows(frames[:max_lines])),
+            *_omission_note(len(frames), max_lines),
             *_worst_case(sameness, frames),
         ]
-    parts += _lines(NARROWED, sameness.narrowed, some)
-    parts += _lines("different names", describe_renames(sameness), some)
-    parts += _lines("differences without effect on motion", [one.words for one in sameness.remarks], some)
+    parts += _lines(MIMIC_LIMITS_HEADING, sameness.narrowed, max_lines)
+    parts += _lines("different names", describe_renames(sameness), max_lines)
+    parts += _lines(
+        "differences without effect on motion", [one.words for one in sameness.remarks], max_lines
+    )
     return TextDocument("", [*parts, str(sameness.confirmation)])
 
 
-def _names(sameness: Sameness) -> list[str]:
+def _names_with_sources(sameness: Sameness) -> list[str]:
     return [f"{name} ({source})" for name, source in zip(sameness.names, sameness.sources, strict=True)]
 
 
@@ -242,13 +257,13 @@ def _worst_case(sameness: Sameness, frames: Sequence[Interval]) -> list[str]:
     return [f"{frames[0].frame} is {off} off at: {configuration_text(sameness, frames[0])}"] if off else []
 
 
-def _reasons(sameness: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
+def _changes_and_differences(sameness: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
     if sameness.up_to_single and not all_:
         return (), []
     return sameness.after, [one.words for one in sameness.differences]
 
 
-PAIRS = ("A", "B", "verdict", "distance bound, as given", "single precision")
+PAIR_HEADS = ("A", "B", "verdict", "distance bound, as given", "single precision")
 
 
 def _pair_rows(pairs: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
@@ -260,8 +275,8 @@ def _pair_rows(pairs: Sequence[Sameness], question: SameQuestion) -> list[tuple[
         if question.within is not None:
             words = f"{'' if one.within(question.within) else 'not '}within {question.within:g}"
         metres, radians = one.bound_as_written
-        off = "no bound" if math.isinf(metres) else _both(metres, radians)
-        single = "" if one.single is None else _both(*one.single)
+        off = "no bound" if math.isinf(metres) else _length_and_angle(metres, radians)
+        single = "" if one.single is None else _length_and_angle(*one.single)
         rows.append((*one.sources, words, off, single))
     return rows
 
@@ -273,27 +288,29 @@ def pairs_document(pairs: Sequence[Sameness], question: SameQuestion = EQUIVALEN
         for one in pairs
         if not one.holds(question)
     ]
-    return TextDocument("", [Table(PAIRS, rows, left=3), *different])
+    return TextDocument("", [Table(PAIR_HEADS, rows, left=3), *different])
 
 
 def pairs_markdown(pairs: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> str:
     rows = (map(markdown_text, row) for row in _pair_rows(pairs, question))
-    return "\n".join([*table_lines(PAIRS, rows), ""])
+    return "\n".join([*table_lines(PAIR_HEADS, rows), ""])
 
 
 def as_document(sameness: Sameness) -> TextDocument:
-    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(sameness), strict=True)]
-    after, words = _reasons(sameness)
+    parts: list[str | Table] = [
+        f"{k}: {name}" for k, name in zip("AB", _names_with_sources(sameness), strict=True)
+    ]
+    after, words = _changes_and_differences(sameness)
     for head, lines in (
         ("Change of B", [*after, describe_as_written(sameness)] if after else []),
         ("Difference", words),
         ("Without effect on motion", [one.words for one in sameness.remarks]),
     ):
-        parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
-        parts += [f"... and {len(lines) - SHOWN} more lines"] if len(lines) > SHOWN else []
+        parts += [f"{head}: {line}" for line in lines[:MAX_LINES] if line]
+        parts += [f"... and {len(lines) - MAX_LINES} more lines"] if len(lines) > MAX_LINES else []
     if frames := far_frames(sameness):
-        parts += [f"{frames_heading(sameness)}:", Table(HEADS, frame_rows(frames[:SHOWN]))]
-        parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
+        parts += [f"{frames_heading(sameness)}:", Table(HEADS, frame_rows(frames[:MAX_LINES]))]
+        parts += [f"... and {len(frames) - MAX_LINES} more frames"] if len(frames) > MAX_LINES else []
         parts += _worst_case(sameness, frames)
     return TextDocument(headline(sameness), [*parts, str(sameness.confirmation)])
 
@@ -309,53 +326,59 @@ def distance_text(frame: Interval) -> str:
     return angle(frame.radians_seen) if frame.radians_seen else ""
 
 
-def _lines(head: str, lines: Sequence[str], some: int | None) -> list[str]:
+def _lines(head: str, lines: Sequence[str], max_lines: int | None) -> list[str]:
     if not lines or not any(lines):
         return []
     heads = [f"{head}:"] if head else []
-    return [*heads, *(f"  {line}" for line in lines[:some]), *_rest(len(lines), some)]
+    return [*heads, *(f"  {line}" for line in lines[:max_lines]), *_omission_note(len(lines), max_lines)]
 
 
-def _rest(n: int, some: int | None) -> list[str]:
-    return [f"  ... and {n - some} more: --all shows them"] if some is not None and n > some else []
+def _omission_note(n: int, max_lines: int | None) -> list[str]:
+    return (
+        [f"  ... and {n - max_lines} more: --all shows them"]
+        if max_lines is not None and n > max_lines
+        else []
+    )
 
 
 def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     mark = "✅" if sameness.holds(question) else "❌"
     text = markdown_text
-    names = " and ".join(map(text, _names(sameness)))
+    names = " and ".join(map(text, _names_with_sources(sameness)))
     lines = [f"## {mark} {text(headline(sameness, question))}", "", names, ""]
-    after, reasons = _reasons(sameness)
+    after, reasons = _changes_and_differences(sameness)
     for head, words in (
         ("Changes of B", [*after, describe_as_written(sameness)] if after else []),
         ("Differences", reasons),
-        (NARROWED.capitalize(), sameness.narrowed),
+        (MIMIC_LIMITS_HEADING.capitalize(), sameness.narrowed),
         ("Different names", describe_renames(sameness)),
         ("Differences without effect on motion", [one.words for one in sameness.remarks]),
     ):
         if words:
             lines += [f"**{head}**", ""]
-            lines += [f"- {text(word)}" for word in words[: 4 * SHOWN]]
+            lines += [f"- {text(word)}" for word in words[: 4 * MAX_LINES]]
             lines += (
-                [f"- {format_count(len(words) - 4 * SHOWN, 'more line')}"] if len(words) > 4 * SHOWN else []
+                [f"- {format_count(len(words) - 4 * MAX_LINES, 'more line')}"]
+                if len(words) > 4 * MAX_LINES
+                else []
             )
             lines.append("")
     frames = far_frames(sameness)
     if frames:
-        cells = (map(text, row) for row in frame_rows(frames[: 4 * SHOWN]))
+        cells = (map(text, row) for row in frame_rows(frames[: 4 * MAX_LINES]))
         lines += [f"{frames_heading(sameness)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
     return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
-#: `HALF` is half the side length of a picture, in units of the SVG.
-#: The drawn robots are `FILLED` times as wide or as high as the picture.
-HALF, FILLED = 150.0, 0.9
+#: `HALF_SIDE` is half the side length of a picture, in units of the SVG.
+#: The drawn robots are `FILLED_FRACTION` times as wide or as high as the picture.
+HALF_SIDE, FILLED_FRACTION = 150.0, 0.9
 #: Maximum length of the scale bar, relative to the side length of a picture.
-MAX_SCALE_BAR = 0.3
+MAX_SCALE_BAR_FRACTION = 0.3
 #: Distance of the scale bar from the picture's lower edge (SVG units).
 SCALE_BAR_MARGIN = 6.0
 #: Length of the axes in the close view, relative to the distance between the two frames.
-AXIS_LENGTH = 0.35
+AXIS_FRACTION = 0.35
 #: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
 
@@ -381,7 +404,7 @@ def as_html(
         headline=headline(sameness, question),
         good=sameness.holds(question),
         narrowed=sameness.narrowed,
-        narrowed_head=NARROWED.capitalize(),
+        narrowed_head=MIMIC_LIMITS_HEADING.capitalize(),
         started=moment.isoformat(timespec="seconds"),
         when=format_date(moment.isoformat(timespec="seconds")),
         versions=versions(),
@@ -436,19 +459,19 @@ def pictures(
             @ inverse(T_b[j])
             @ T_b
         )
-    bones = _bones(a, T_a), _bones(b, T_b)
-    drawings = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
+    skeletons = _skeleton_lines(a, T_a), _skeleton_lines(b, T_b)
+    drawings = [_make_picture(title, azimuth, elevation, skeletons) for title, azimuth, elevation in VIEWS]
     if worst is not None:
         at = T_a[a.tree.link_index(worst.frame)], T_b[b.tree.link_index(worst.frame_b)]
         distance = float(np.linalg.norm(at[0][:3, 3] - at[1][:3, 3]))
         if distance > 0.0:
-            axes = tuple(_axes(T, AXIS_LENGTH * distance) for T in at)
+            axes = tuple(_axes(T, AXIS_FRACTION * distance) for T in at)
             gap = np.stack((at[0][:3, 3], at[1][:3, 3]))[np.newaxis]
-            drawings.append(_draw(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
+            drawings.append(_make_picture(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
     return drawings
 
 
-def _bones(robot: Robot, Ts: FloatArray) -> FloatArray:
+def _skeleton_lines(robot: Robot, Ts: FloatArray) -> FloatArray:
     """Return a line for each joint (joints, 2, 3), from the parent link's origin to the child's origin."""
     ends = [(Ts[joint.parent, :3, 3], Ts[i + 1, :3, 3]) for i, joint in enumerate(robot.tree.joints)]
     return np.array(ends).reshape(-1, 2, 3)
@@ -460,33 +483,37 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
     return np.stack((origin, origin + size * T[:3, :3].T), axis=1)
 
 
-def _draw(
-    title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
+def _make_picture(
+    title: str,
+    azimuth: float,
+    elevation: float,
+    lines: tuple[FloatArray, FloatArray],
+    gap: FloatArray | None = None,
 ) -> dict[str, Any]:
-    c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
+    c, s, up, down = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
     # Matrix that projects a point in space into the picture.
     # In the picture, x points to the right, and y points down.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
-    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), MIN_DIVISOR)
+    scale = 2.0 * HALF_SIDE * FILLED_FRACTION / max(float((high - low).max()), MIN_DIVISOR)
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
-    ruler = round_length(2.0 * HALF * MAX_SCALE_BAR / scale)
+    ruler = round_length_down(2.0 * HALF_SIDE * MAX_SCALE_BAR_FRACTION / scale)
     bar = {
-        "x": -HALF * FILLED,
-        "y": HALF - SCALE_BAR_MARGIN,
+        "x": -HALF_SIDE * FILLED_FRACTION,
+        "y": HALF_SIDE - SCALE_BAR_MARGIN,
         "width": round(ruler * scale, 1),
         "words": length(ruler),
     }
-    return {"title": title, "a": placed[0], "b": placed[1], "gap": placed[2], "half": HALF, "scale": bar}
+    return {"title": title, "a": placed[0], "b": placed[1], "gap": placed[2], "half": HALF_SIDE, "scale": bar}
 
 
-def round_length(most: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is at most `most`.
+def round_length_down(limit: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is at most `limit`.
 
-    >>> round_length(0.034), round_length(7.0), round_length(1.0)
+    >>> round_length_down(0.034), round_length_down(7.0), round_length_down(1.0)
     (0.02, 5.0, 1.0)
     """
-    exponent = math.floor(math.log10(most))
-    return max(x for x in (float(f"{k}e{exponent}") for k in (1, 2, 5)) if x <= most)
+    exponent = math.floor(math.log10(limit))
+    return max(x for x in (float(f"{k}e{exponent}") for k in (1, 2, 5)) if x <= limit)

@@ -17,6 +17,7 @@ from urdfkin.report.words import (
     check_name,
     checks_in_order,
     checks_of_quantity,
+    disagreement_cell,
     error_cells,
     format_count,
     format_ratio,
@@ -25,6 +26,7 @@ from urdfkin.report.words import (
     pinocchio_version,
     quantities,
     quantities_by_heading,
+    quantities_disagreement_cell,
     quantity_name,
     second_oracle_heads,
     second_oracle_rows,
@@ -32,8 +34,6 @@ from urdfkin.report.words import (
     second_reader_words,
     summary,
     worst,
-    worst_cell,
-    worst_cell_of_quantities,
 )
 from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobot, outcome_of
 
@@ -61,8 +61,8 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
     elif out.width >= _WIDE:
         _print_wide(robots, out)
     else:
-        _print_robots(robots, out)
-        _print_quantities(robots, out)
+        _print_robot_table(robots, out)
+        _print_quantity_table(robots, out)
     if (title := second_oracle_title(robots)) is not None:
         out.print(
             f"urdfkin, Pinocchio and {title}: the largest ratio of a disagreement to its bound, for each"
@@ -95,7 +95,7 @@ def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | No
     return {key: sources for key, sources in names.items() if len(sources) > 4}
 
 
-def _counts(robot: ReportedRobot) -> list[str]:
+def _count_cells(robot: ReportedRobot) -> list[str]:
     return [robot["source"], str(len(robot["joints"])), str(len(robot["frames"])), f"{robot['results']:,}"]
 
 
@@ -104,8 +104,8 @@ def _print_wide(robots: Sequence[ReportedRobot], out: Console) -> None:
     heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
     rows = [
         [
-            *_counts(robot),
-            *(worst_cell_of_quantities(robot, names) for names in quantities_of.values()),
+            *_count_cells(robot),
+            *(quantities_disagreement_cell(robot, names) for names in quantities_of.values()),
             robot["verdict"],
         ]
         for robot in robots
@@ -113,12 +113,12 @@ def _print_wide(robots: Sequence[ReportedRobot], out: Console) -> None:
     print_table(out, Table(heads, rows, left=(0, len(heads) - 1)))
 
 
-def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
+def _print_robot_table(robots: Sequence[ReportedRobot], out: Console) -> None:
     heads = ["robot", "joints", "frames", "results", "worst", "of bound", "verdict"]
     rows = [
         [
-            *_counts(robot),
-            worst_cell(robot["checks"]),
+            *_count_cells(robot),
+            disagreement_cell(robot["checks"]),
             bound_ratio_cell(robot),
             robot["verdict"],
         ]
@@ -127,7 +127,7 @@ def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
     print_table(out, Table(heads, rows, left=(0, 6)))
 
 
-def _print_quantities(robots: Sequence[ReportedRobot], out: Console) -> None:
+def _print_quantity_table(robots: Sequence[ReportedRobot], out: Console) -> None:
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in checks_of_quantity(robot, name)]

@@ -115,11 +115,11 @@ def checks_of_quantities(robot: ReportedRobot, names: Sequence[str]) -> list[Rep
     return [check for name in names for check in checks_of_quantity(robot, name)]
 
 
-def worst_cell_of_quantities(robot: ReportedRobot, names: Sequence[str]) -> str:
-    return worst_cell(checks_of_quantities(robot, names))
+def quantities_disagreement_cell(robot: ReportedRobot, names: Sequence[str]) -> str:
+    return disagreement_cell(checks_of_quantities(robot, names))
 
 
-def worst_cell(checks: Sequence[ReportedCheck]) -> str:
+def disagreement_cell(checks: Sequence[ReportedCheck]) -> str:
     return format_units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 

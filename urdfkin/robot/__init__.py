@@ -25,7 +25,7 @@ from urdfkin.errors import InputError, RangeError, RepresentationSingularityErro
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_int, as_names, as_str, safe_repr
-from urdfkin.export import QUANTITIES as EXPORTED
+from urdfkin.export import DEFAULT_QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import as_finite, as_vectors
 from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 from urdfkin.kinematics.roundings import EPS
@@ -1417,10 +1417,10 @@ class Robot(Displayable):
         True
         """
         with import_lock:
-            from urdfkin.export.python import require_torch, torch_module
+            from urdfkin.export.python import load_torch_module, require_torch
 
         require_torch()
-        return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
+        return load_torch_module(self.export("torch", frame, quantities, reference, verify=verify))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
 

@@ -81,12 +81,12 @@ class _Canvas:
         a, b = self.projection @ start, self.projection @ (start + along)
         look = {"arrowstyle": "-|>", "color": color, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", xy=b, xytext=a, zorder=4, arrowprops=look)
-        self.label(start + 1.25 * along, along, name, color)
+        self.add_label(start + 1.25 * along, along, name, color)
 
     def mark(self, point: FloatArray, **style: Any) -> None:
         self.axes.plot(*(self.projection @ point)[:, None], zorder=5, **style)
 
-    def label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
+    def add_label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def draw_labels(self) -> None:
@@ -145,7 +145,7 @@ def _draw(canvas: _Canvas, table: DHTable, frames: FloatArray, tip: FloatArray) 
         canvas.line(origin - 0.2 * size * z, origin + 0.28 * size * z, **dashes)
         marker = {"marker": "o" if row.kind.turns else "s", "color": _TEXT, "markerfacecolor": "white"}
         canvas.mark(origin, markersize=5.5, **marker)
-        canvas.label(origin - 0.24 * size * z, z, label(row.joint), "#6f7d8c")
+        canvas.add_label(origin - 0.24 * size * z, z, label(row.joint), "#6f7d8c")
     dots = {"color": _D, "linewidth": 1.2, "linestyle": ":"}
     canvas.line(np.zeros(3), frames[0, :3, 3], **dots)
     canvas.line(frames[-1, :3, 3], tip[:3, 3], **dots)
@@ -153,6 +153,6 @@ def _draw(canvas: _Canvas, table: DHTable, frames: FloatArray, tip: FloatArray) 
         canvas.arrow(T[:3, 3], 0.13 * size * T[:3, 0], _X, f"$x_{{{i}}}$")
         canvas.arrow(T[:3, 3], 0.13 * size * T[:3, 2], _Z, f"$z_{{{i}}}$")
     canvas.mark(tip[:3, 3], marker="D", color=_TEXT, markersize=4.5)
-    canvas.label(
+    canvas.add_label(
         tip[:3, 3] - 0.07 * size * (tip[:3, 0] + tip[:3, 2]), tip[:3, 2], label(table.tip_frame), _TEXT
     )

@@ -90,7 +90,7 @@ def _matplotlib() -> Any:
         return importlib.import_module("matplotlib")
 
 
-def save(figure: Figure, path: Path) -> bytes:
+def figure_bytes(figure: Figure, path: Path) -> bytes:
     """Return the figure as bytes in the format that `path` ends with; equal figures give equal bytes."""
     format_ = path.suffix.removeprefix(".").lower()
     if format_ not in FORMATS:

@@ -18,7 +18,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory
-from urdfkin.view.plot import caption
+from urdfkin.view.plot import check_summary
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
@@ -60,16 +60,16 @@ class Player:
             self.speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
             self.words = gui.add_markdown("")
             save = gui.add_button("save the motion (GIF)")
-        self.time.on_update(lambda _: self._show_slider_time())
+        self.time.on_update(lambda _: self._show_sample_at_slider())
         self.button.on_click(lambda _: self.pause() if self._playing.is_set() else self.play())
         save.on_click(lambda event: self._save(event.client))
 
-    def check(self) -> None:
+    def check_trajectory(self) -> None:
         viewer, x = self._viewer, self.trajectory
         motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
         mark = "! " if motion.unverified_reason is not None else "✓ " if motion.agrees else "✗ "
-        self._check_line = mark + caption(motion, x)
-        self._write()
+        self._check_line = mark + check_summary(motion, x)
+        self._write_text()
 
     def show(self, sample: int) -> None:
         self.sample, x = sample, self.trajectory
@@ -79,20 +79,20 @@ class Player:
         finally:
             self._is_setting = False
         self._viewer.set_state(x.q[sample], x.v[sample], x.a[sample])
-        self._write()
+        self._write_text()
 
-    def _write(self) -> None:
+    def _write_text(self) -> None:
         x = self.trajectory
         sample = f"sample {self.sample + 1} of {len(x.t)}, t = {x.t[self.sample]:.4g} s"
         self.words.content = f"**{sample}**\n\n{markdown_text(self._check_line)}"
 
-    def _nearest(self, seconds: float) -> int:
+    def _nearest_sample(self, seconds: float) -> int:
         return int(np.abs(self.trajectory.t - seconds).argmin())
 
-    def _show_slider_time(self) -> None:
+    def _show_sample_at_slider(self) -> None:
         if not self._is_setting:
             self.pause()
-            self.show(self._nearest(float(self.time.value)))
+            self.show(self._nearest_sample(float(self.time.value)))
 
     def play(self) -> None:
         if not self._playing.is_set():
@@ -109,7 +109,7 @@ class Player:
         now = float(t[0] if self.sample == len(t) - 1 else t[self.sample])
         last = time.perf_counter()
         while self._playing.is_set():
-            self.show(self._nearest(now))
+            self.show(self._nearest_sample(now))
             if now >= t[-1]:
                 self.pause()
                 return
@@ -128,7 +128,7 @@ class Player:
         frames: list[np.ndarray] = []
         try:
             for k, moment in enumerate(np.linspace(t[0], t[-1], count)):
-                self.show(self._nearest(float(moment)))
+                self.show(self._nearest_sample(float(moment)))
                 frames.append(_new_picture(client, frames[-1] if frames else None))
                 note.body = f"{k + 1} of {count} pictures"
         except (RuntimeError, TimeoutError):  # Browsers draw nothing in a background tab.
@@ -152,12 +152,12 @@ def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
     return picture
 
 
-def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
-    """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds`."""
+def as_gif(frames: list[np.ndarray], seconds_per_frame: float) -> bytes:
+    """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds_per_frame`."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
     # Browsers show GIF frames of 1/100 s for too long.
-    milliseconds = max(20, 10 * round(100 * seconds))
+    milliseconds = max(20, 10 * round(100 * seconds_per_frame))
     images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=milliseconds, loop=0)
     return stream.getvalue()
 

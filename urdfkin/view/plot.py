@@ -36,7 +36,7 @@ STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
 _MOST_NAMES = 14
-_UNNAMED = "#9AA7B5"
+_UNNAMED_COLOUR = "#9AA7B5"
 
 
 def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
@@ -57,13 +57,13 @@ def _make_xyz_panel(vector: Callable[[FrameMotion], FloatArray], label: str) -> 
     return panel
 
 
-def _rotation(x: FrameMotion) -> FloatArray:
+def _rotation_vectors(x: FrameMotion) -> FloatArray:
     """Return the frame's rotation since the first sample: rotation vectors (n, 3) in world axes, in rad."""
     R = x.placement[:, :3, :3]
     return log_rotation(R @ R[0].T)
 
 
-def draw_parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+def draw_acceleration_parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     sizes = np.linalg.norm(x.breakdown.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(ACCELERATION_KINDS)) if sizes[:, k].any()]
@@ -119,12 +119,12 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 PANELS: dict[str, Panel] = {
     "position": _make_xyz_panel(lambda x: x.placement[:, :3, 3], "position [m]"),
-    "orientation": _make_xyz_panel(_rotation, "rotation [rad]"),
+    "orientation": _make_xyz_panel(_rotation_vectors, "rotation [rad]"),
     "velocity": _make_xyz_panel(lambda x: x.velocity[:, :3], "velocity [m/s]"),
     "angular-velocity": _make_xyz_panel(lambda x: x.velocity[:, 3:], "angular velocity\n[rad/s]"),
     "acceleration": _make_xyz_panel(lambda x: x.acceleration[:, :3], "acceleration [m/s²]"),
     "angular-acceleration": _make_xyz_panel(lambda x: x.acceleration[:, 3:], "ang. acceleration\n[rad/s²]"),
-    "parts": draw_parts,
+    "parts": draw_acceleration_parts,
     "singular-values": partial(draw_singular_values, rows=_LINEAR, unit="m/s"),
     "angular-singular-values": partial(draw_singular_values, rows=_ANGULAR, unit="rad/s"),
     "manipulability": partial(draw_manipulability, rows=_LINEAR, unit="(m/s)³"),
@@ -133,10 +133,10 @@ PANELS: dict[str, Panel] = {
 }
 
 #: Suffix after "rad" or "m" in the unit of q, v or a.
-_PER = {"q": "", "v": "/s", "a": "/s²"}
+_UNIT_SUFFIX = {"q": "", "v": "/s", "a": "/s²"}
 #: "q", "v" and "a" select panels of the robot's coordinates.
 #: Angles, lengths and quaternions have separate panels.
-COORDINATES = tuple(_PER)
+COORDINATE_PANELS = tuple(_UNIT_SUFFIX)
 
 
 def make_coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
@@ -175,7 +175,7 @@ def _draw_coordinates(
     others = [i for i in moves if i not in named]
     for i in others:
         count = f"{len(others)} {'others' if named else 'joints'}" if i == others[0] else ""
-        axes.plot(t, values[:, i], color=_UNNAMED, linewidth=0.7, label=count)
+        axes.plot(t, values[:, i], color=_UNNAMED_COLOUR, linewidth=0.7, label=count)
     _draw_lines(
         axes, t, values[:, named],
         [names[i] if k < _MOST_NAMES else "" for k, i in enumerate(named)],
@@ -189,7 +189,7 @@ def _draw_coordinates(
         axes.plot(t[mask], values[mask, i], "x", color=BAD, markersize=3.0, label=crosses)
         crosses = ""
     bounded = any(bounds.values())
-    name = f"{unit}{_PER[what]}" if unit else "quaternion"
+    name = f"{unit}{_UNIT_SUFFIX[what]}" if unit else "quaternion"
     axes.set_ylabel(f"{what} [{name}]" + ("\nthin: limits" if bounded else ""))
 
 
@@ -212,14 +212,14 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 
 #: Width and maximum height of a figure, in inches.
 #: This size fits on A4 and US Letter with a margin.
-_PAGE = (7.6, 10.4)
+_PAGE_SIZE = (7.6, 10.4)
 #: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
 #: Letters per inch in the footer and in a legend.
-_LETTERS, _LETTERS_OF_LEGEND = 16, 22
+_LETTERS_PER_INCH, _LEGEND_LETTERS_PER_INCH = 16, 22
 #: Width of the line sample and the gaps in a legend entry. The unit is the width of one letter.
-_HANDLE = 8
-_VELOCITIES_UNCHECKED = (
+_HANDLE_LETTERS = 8
+_DERIVATIVES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )
 
@@ -227,15 +227,15 @@ _VELOCITIES_UNCHECKED = (
 def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
     """Return a figure with the panels that `panels` names. By default, the figure contains all panels.
 
-    The names of panels are the keys of `PANELS` and the names in `COORDINATES`.
+    The names of panels are the keys of `PANELS` and the names in `COORDINATE_PANELS`.
     """
-    drawn = _select_panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
+    drawn = _select_panels(robot, trajectory, list(panels) or [*COORDINATE_PANELS, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)
     height = _PANEL_HEIGHT * max(2, rows) + _TEXT_HEIGHT
-    width, small = _PAGE[0], 6 if columns == 3 else 7
+    width, small = _PAGE_SIZE[0], 6 if columns == 3 else 7
     with style(font_size=small + 1, axes_ymargin=0.08, lines_linewidth=1.2):
-        figure = new_figure(width, min(height, _PAGE[1]))
+        figure = new_figure(width, min(height, _PAGE_SIZE[1]))
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
         for axes in grid.flat[len(drawn) :]:
             axes.set_axis_off()
@@ -243,8 +243,8 @@ def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Se
             panel(axes, x, trajectory.t)
             axes.grid(color="#dddddd", linewidth=0.5)
             if names := axes.get_legend_handles_labels()[1]:
-                letters = _LETTERS_OF_LEGEND * width / columns * 6 / small
-                across = max(1, min(7, int(letters) // (max(map(len, names)) + _HANDLE)))
+                letters = _LEGEND_LETTERS_PER_INCH * width / columns * 6 / small
+                across = max(1, min(7, int(letters) // (max(map(len, names)) + _HANDLE_LETTERS)))
                 axes.legend(
                     fontsize=small,
                     frameon=False,
@@ -258,8 +258,8 @@ def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Se
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
         title = label(f"{robot.name}: {x.frame}, {x.reference.name}")
-        figure.suptitle(f"{title}\n{_path_text(x, trajectory)}", fontsize=10)
-        words = textwrap.wrap(label(caption(x, trajectory)), width=int(_LETTERS * width))
+        figure.suptitle(f"{title}\n{_endpoints_text(x, trajectory)}", fontsize=10)
+        words = textwrap.wrap(label(check_summary(x, trajectory)), width=int(_LETTERS_PER_INCH * width))
         figure.supxlabel("\n".join(words), fontsize=7, color="#444444")
     return figure
 
@@ -267,24 +267,24 @@ def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Se
 def _select_panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
     found = list[Panel]()
     for name in names:
-        if name in COORDINATES:
+        if name in COORDINATE_PANELS:
             found += make_coordinate_panels(robot, trajectory, name)
         elif name in PANELS:
             found.append(PANELS[name])
         else:
-            raise UnknownNameError("panel", name, [*COORDINATES, *PANELS])
+            raise UnknownNameError("panel", name, [*COORDINATE_PANELS, *PANELS])
     return found
 
 
-def _path_text(x: FrameMotion, trajectory: Trajectory) -> str:
+def _endpoints_text(x: FrameMotion, trajectory: Trajectory) -> str:
     start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
     return f"from ({start}) to ({end}) m in {trajectory.t[-1] - trajectory.t[0]:.4g} s"
 
 
-def caption(x: FrameMotion, trajectory: Trajectory) -> str:
+def check_summary(x: FrameMotion, trajectory: Trajectory) -> str:
     """Return one line: the result of the check, and how v and a were computed."""
     rates = f"rates {trajectory.rates_source}" + (
-        ", exactly" if trajectory.exact else f"; {_VELOCITIES_UNCHECKED}"
+        ", exactly" if trajectory.exact else f"; {_DERIVATIVES_UNCHECKED}"
     )
     if x.unverified_reason is not None:
         return f"NOT VERIFIED by Pinocchio {version()}: {x.unverified_reason}; {rates}"

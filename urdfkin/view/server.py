@@ -172,17 +172,17 @@ def policy(nonce: str, host: str) -> str:
 LOOPBACK = "127.0.0.1"
 
 #: The only message that the server accepts from a page: a control has changed.
-_ACCEPTED = ("GuiUpdateMessage",)
+_ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
 #: Viser's script creates another script element.
 #: The second replacement adds the nonce to this script element.
-_SCRIPTS = (
+_NONCE_REPLACEMENTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
 #: Start of the page's head, after which urdfkin's script is added.
-_HEAD = '<meta charset="utf-8" />'
+_HEAD_START = '<meta charset="utf-8" />'
 _serve_lock = make_fork_safe_lock()
 
 
@@ -211,13 +211,13 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
             del verbose
             return None  # Sharing would open a tunnel to a third party.
 
-    _require_address(host)
+    _require_usable_address(host)
     requests = RequestFilter(host, secrets.token_urlsafe(16))
     # Viser would print its address without the key.
     with _filter_requests(_process_request(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:
-        _remove_handlers(server)
+        _remove_message_handlers(server)
         _test_filter(requests, server.get_port())
     except BaseException:
         server.stop()
@@ -226,7 +226,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     return server
 
 
-def _require_address(host: str) -> None:
+def _require_usable_address(host: str) -> None:
     """Raise InputError if the server cannot listen on the address `host`.
 
     Without this check, viser would search for a free port forever.
@@ -280,16 +280,16 @@ def _page() -> Callable[[str], bytes]:
         text = file.read_text(encoding="utf-8")
     except OSError as error:
         raise UnguardedError("the page of viser is not at the expected path") from error
-    if text.count("<script") != 1 or any(text.count(old) != 1 for old, _ in _SCRIPTS):
+    if text.count("<script") != 1 or any(text.count(old) != 1 for old, _ in _NONCE_REPLACEMENTS):
         raise UnguardedError("the page of viser has unexpected scripts")
-    if text.count(_HEAD) != 1:
+    if text.count(_HEAD_START) != 1:
         raise UnguardedError("the page of viser has no <head> element")
     # urdfkin's style and script run before viser's.
     own = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
-        html_ = text.replace(_HEAD, _HEAD + own.replace("{nonce}", nonce))
-        for old, new in _SCRIPTS:
+        html_ = text.replace(_HEAD_START, _HEAD_START + own.replace("{nonce}", nonce))
+        for old, new in _NONCE_REPLACEMENTS:
             html_ = html_.replace(old, new.format(nonce=nonce))
         return html_.encode()
 
@@ -319,20 +319,21 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 # -- checks of the server -----------------------------------------------------------------------------
 
 
-def _remove_handlers(server: Any) -> None:
-    """Remove the handlers with which viser processes messages from a page, except those in `_ACCEPTED`.
+def _remove_message_handlers(server: Any) -> None:
+    """Remove the handlers with which viser processes messages from a page.
 
-    For example, viser handles a page's messages about sharing, uploads and commands.
+    The handlers of the messages in `_ACCEPTED_MESSAGES` remain. For example, viser handles a page's messages
+    about sharing, uploads and commands. These handlers are removed.
     """
     try:
         websocket_server = server._websock_server
         for message in list(websocket_server._incoming_handlers):
-            if message.__name__ not in _ACCEPTED:
+            if message.__name__ not in _ACCEPTED_MESSAGES:
                 websocket_server.unregister_handler(message)
         accepted = {message.__name__ for message in websocket_server._incoming_handlers}
     except (AttributeError, AssertionError) as error:
         raise UnguardedError("urdfkin cannot find the message handlers of viser") from error
-    if accepted != set(_ACCEPTED):
+    if accepted != set(_ACCEPTED_MESSAGES):
         names = ", ".join(sorted(accepted)) or "(none)"
         raise UnguardedError(f"viser accepts the unexpected messages {names}")
 

@@ -33,7 +33,7 @@ PART_COLOURS = {
     "sliding": (204, 121, 167),
     "sum": (30, 30, 30),
 }
-LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
+LINEAR_COLOUR, ANGULAR_COLOUR = (0, 114, 178), (204, 121, 167)
 #: Length of the longest arrow, as a fraction of the robot's size.
 _ARROW_FRACTION = 0.3
 
@@ -66,7 +66,7 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
     keep = np.linalg.norm(columns, axis=1) > 1e-9
-    colour = ANGULAR if angular else LINEAR
+    colour = ANGULAR_COLOUR if angular else LINEAR_COLOUR
     names = tuple(name for name, used in zip(rates, keep, strict=True) if used)
     return _arrows(x, columns[keep], [colour] * int(keep.sum()), names, reach)
 
@@ -121,8 +121,8 @@ def quaternions_scalar_first(R: FloatArray) -> FloatArray:
 
 
 #: Maximum time until a page has its final layout, s.
-_OPENING = 15.0
-_TO_CAMERA = np.array([1.1, -1.3, 0.6])
+_LAYOUT_TIME = 15.0
+_CAMERA_DIRECTION = np.array([1.1, -1.3, 0.6])
 #: Fraction of the view that the robot fills.
 _FILLED_FRACTION = 0.85
 #: Viser's vertical field of view (rad).
@@ -136,7 +136,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
     of view (rad). `aspect` is the width of the picture divided by the height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
-    back = _TO_CAMERA / np.linalg.norm(_TO_CAMERA)
+    back = _CAMERA_DIRECTION / np.linalg.norm(_CAMERA_DIRECTION)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     up = np.cross(back, right)
@@ -146,12 +146,12 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
     return middle + max(distance, 0.1) * back, middle
 
 
-_BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
+_LINK_COLOUR, _REVOLUTE_COLOUR, _PRISMATIC_COLOUR = (142, 153, 168), (0, 114, 178), (230, 159, 0)
 SOLID, SEE_THROUGH = "solid", "see-through"
-SHAPES = (SOLID, SEE_THROUGH, "hidden")
-NAMES = ("none", "links", "joints")
+SHAPE_CHOICES = (SOLID, SEE_THROUGH, "hidden")
+NAME_CHOICES = ("none", "links", "joints")
 _OPACITY = 0.3
-_NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
+_NORMAL_COLOUR, _OFFSET_COLOUR = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
@@ -179,19 +179,19 @@ class Stage:
             axes_radius=0.0015 * self.reach,
             visible=False,
         )
-        self._labels = {kind: self._add_names(kind, tree) for kind in NAMES[1:]}
+        self._labels = {kind: self._add_names(kind, tree) for kind in NAME_CHOICES[1:]}
         self._skeleton: list[Any] = []
         self._shapes: list[tuple[Shape, Any]] = []
         self._transparent: list[Any] = []
         self._corners: list[tuple[int, FloatArray]] = []
         needs_skeleton = self._add_shapes(tree)
         self._add_skeleton(tree)
-        self.show(shapes=SOLID, skeleton=needs_skeleton, axes=False, names=NAMES[0])
+        self.show(shapes=SOLID, skeleton=needs_skeleton, axes=False, names=NAME_CHOICES[0])
         self._dh: list[Any] = []
-        self.fit_cameras(Ts[np.newaxis])
-        server.on_client_connect(self._welcome)
+        self.set_initial_camera(Ts[np.newaxis])
+        server.on_client_connect(self._set_first_camera)
 
-    def fit_cameras(self, Ts: FloatArray) -> None:
+    def set_initial_camera(self, Ts: FloatArray) -> None:
         """Set the first camera of new pages, so that the robot is visible in n configurations.
 
         `Ts` (n, links, 4, 4) contains the placements of the links.
@@ -240,21 +240,21 @@ class Stage:
 
         def add(name: str, axis: FloatArray, radius: float, height: float, color: Any, p: FloatArray) -> None:
             look = {"radius": radius, "height": height, "color": color}
-            pose = {"wxyz": quaternions_scalar_first(_towards(axis)), "position": p}
+            pose = {"wxyz": quaternions_scalar_first(_rotate_z_to(axis)), "position": p}
             self._skeleton.append(self._scene.add_cylinder(f"/robot/{name}", **look, **pose))
 
         for i, joint in enumerate(tree.joints):
             p = joint.T_parent_joint[:3, 3]
             if (length := float(np.linalg.norm(p))) > 1e-6 * self.reach:
-                add(f"{joint.parent}/bone{i}", p / length, 0.3 * r, length, _BONE, p / 2)
+                add(f"{joint.parent}/bone{i}", p / length, 0.3 * r, length, _LINK_COLOUR, p / 2)
             if joint.kind.turns:
-                add(f"{i + 1}/joint{i}", joint.axis, r, 2.2 * r, _TURN, p0)
+                add(f"{i + 1}/joint{i}", joint.axis, r, 2.2 * r, _REVOLUTE_COLOUR, p0)
             elif joint.kind.has_axis:
-                add(f"{i + 1}/joint{i}", joint.axis, 0.6 * r, 3.4 * r, _SLIDE, p0)
+                add(f"{i + 1}/joint{i}", joint.axis, 0.6 * r, 3.4 * r, _PRISMATIC_COLOUR, p0)
 
     def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
-        joint_roundings = [joint.name if joint.kind.nv else "" for joint in tree.joints]
-        words = tree.links if kind == "links" else ("", *joint_roundings)
+        joint_names = [joint.name if joint.kind.nv else "" for joint in tree.joints]
+        words = tree.links if kind == "links" else ("", *joint_names)
         return [
             self._scene.add_label(
                 f"/robot/{i}/{kind}",
@@ -267,7 +267,7 @@ class Stage:
             if word
         ]
 
-    def _add_transparent(self) -> list[Any]:
+    def _add_transparent_copies(self) -> list[Any]:
         copies = []
         for shape, solid in self._shapes:
             name = f"{solid.name}-transparent"
@@ -282,22 +282,22 @@ class Stage:
         for client in self._server.get_clients().values():
             self._set_camera(client)
 
-    def _welcome(self, client: Any) -> None:
+    def _set_first_camera(self, client: Any) -> None:
         """Set the camera of a new page.
 
         Shortly after a page opens, the panel makes the view narrower. The camera is then set again.
         """
         begin, last_aspect = time.monotonic(), 0.0
 
-        def fit(_: Any) -> None:
+        def update_camera(_: Any) -> None:
             nonlocal last_aspect
             aspect = client.camera.aspect
-            if aspect != last_aspect and time.monotonic() - begin < _OPENING:
+            if aspect != last_aspect and time.monotonic() - begin < _LAYOUT_TIME:
                 last_aspect = aspect
                 self._set_camera(client)
 
-        client.camera.on_update(fit)
-        fit(None)
+        client.camera.on_update(update_camera)
+        update_camera(None)
 
     def _set_camera(self, client: Any) -> None:
         position, middle = camera(self._points_in_view, aspect=client.camera.aspect, fov=client.camera.fov)
@@ -308,7 +308,7 @@ class Stage:
     def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
         self.skeleton_shown = skeleton
         if shapes == SEE_THROUGH and not self._transparent:
-            self._transparent = self._add_transparent()
+            self._transparent = self._add_transparent_copies()
         for _, handle in self._shapes:
             handle.visible = shapes == SOLID
         for handle in self._transparent:
@@ -364,7 +364,7 @@ class Stage:
         frames = T_world_base @ table.frames(q)
         starts, middles, ends = frames[:-1, :3, 3], row_corners(table, frames), frames[1:, :3, 3]
         standard = table.convention is DHConvention.STANDARD
-        first, second = (_OFFSET, _NORMAL) if standard else (_NORMAL, _OFFSET)
+        first, second = (_OFFSET_COLOUR, _NORMAL_COLOUR) if standard else (_NORMAL_COLOUR, _OFFSET_COLOUR)
         axes = self._scene.add_batched_axes(
             "/dh/frames",
             batched_wxyzs=quaternions_scalar_first(frames[:, :3, :3]),
@@ -380,7 +380,7 @@ class Stage:
                 self._dh.append(self._scene.add_line_segments(f"/dh/lines{k}", points=points, **look))
 
 
-def _towards(axis: FloatArray) -> FloatArray:
+def _rotate_z_to(axis: FloatArray) -> FloatArray:
     """Return a rotation (3, 3) that turns the z axis into the direction `axis`."""
     side = np.eye(3)[int(np.abs(axis).argmin())]
     x = np.cross(side, axis)

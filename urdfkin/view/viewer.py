@@ -27,10 +27,10 @@ from urdfkin.verify.pinocchio import version
 from urdfkin.view.player import Player, as_png
 from urdfkin.view.scene import Shape
 from urdfkin.view.stage import (
-    NAMES,
+    NAME_CHOICES,
     PART_COLOURS,
     SEE_THROUGH,
-    SHAPES,
+    SHAPE_CHOICES,
     SOLID,
     Stage,
     acceleration_arrows,
@@ -40,13 +40,13 @@ from urdfkin.view.stage import (
 
 #: Joint ranges (rad, m) of at least this size count as unlimited.
 #: Velocity limits (rad/s, m/s) of at least this size count as unlimited too.
-_UNLIMITED = 100.0
+_UNLIMITED_RANGE = 100.0
 #: Step of a slider for an angle or an angle's derivative: _DEGREES if shown in degrees, else _RADIANS.
 #: An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
 #: Minimum number of steps of a slider in m, m/s or m/s^2.
 #: The slider's step is 1, 2 or 5 times a power of ten.
-_STEPS = 50.0
+_MIN_STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
 #: Largest joint velocity (rad/s, m/s) of a slider if the joint has no velocity limit.
 #: Largest joint acceleration (rad/s^2, m/s^2) of a slider.
@@ -151,7 +151,7 @@ class Sliders:
     def _step(self, row: SliderRow, width: float) -> float:
         if row.is_angle:
             return _DEGREES if self._degrees else _RADIANS
-        size = width / _STEPS
+        size = width / _MIN_STEPS
         power = 10.0 ** math.floor(math.log10(size))
         return next(power * digit for digit in (5.0, 2.0, 1.0) if power * digit <= size * (1.0 + 1e-9))
 
@@ -191,7 +191,7 @@ def velocity_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
             most = _ACCELERATION if second else _VELOCITY
-            if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _UNLIMITED:
+            if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _UNLIMITED_RANGE:
                 most = joint.limit.velocity
             turns = k >= 3 if joint.nv == 6 else _is_angle(joint, k)
             rows.append(SliderRow(at + k, robot.velocity_names[at + k], turns, -most, most))
@@ -204,7 +204,7 @@ def _is_angle(joint: Joint, k: int) -> bool:
 
 def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
     limit = joint.limit
-    if limit is None or joint.kind.value == "continuous" or not limit.upper - limit.lower < _UNLIMITED:
+    if limit is None or joint.kind.value == "continuous" or not limit.upper - limit.lower < _UNLIMITED_RANGE:
         return -otherwise, otherwise
     return limit.lower, limit.upper
 
@@ -307,23 +307,23 @@ class Viewer:
         self._lock = threading.RLock()
         self.player: Player | None = None
         self._build(trajectory)
-        self._fit_cameras()
-        self._write_q()
+        self._set_initial_camera()
+        self._write_q_field()
         self.update()
         if self.player is not None:
-            self.player.check()
+            self.player.check_trajectory()
             self.player.show(0)
 
-    def _fit_cameras(self) -> None:
+    def _set_initial_camera(self) -> None:
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
             q = np.concatenate([q, samples[np.linspace(0, len(samples) - 1, 50).astype(int)]])
-        self.stage.fit_cameras(self.robot.placement(q, self.robot.link_frames, verify=False))
+        self.stage.set_initial_camera(self.robot.placement(q, self.robot.link_frames, verify=False))
 
     def _reset_camera(self) -> None:
         with self._lock:
-            self._fit_cameras()
+            self._set_initial_camera()
             self.stage.reset_cameras()
 
     @property
@@ -342,7 +342,7 @@ class Viewer:
         if trajectory is not None:
             self.player = Player(self, trajectory)
         with gui.add_folder("Show"):
-            self.shapes = gui.add_dropdown("shapes", SHAPES)
+            self.shapes = gui.add_dropdown("shapes", SHAPE_CHOICES)
             self.axes = gui.add_checkbox("link frames", initial_value=False)
             self.dh = gui.add_dropdown("DH frames", ("none", "standard", "modified"))
             self.dh_words = gui.add_markdown("")
@@ -369,21 +369,21 @@ class Viewer:
             self.words = gui.add_markdown("")
         with gui.add_folder("Show more"):
             self.skeleton = gui.add_checkbox("skeleton", initial_value=self.stage.skeleton_shown)
-            self.names = gui.add_dropdown("names", NAMES)
+            self.names = gui.add_dropdown("names", NAME_CHOICES)
             self.columns = gui.add_dropdown("Jacobian's columns", ("none", "linear", "angular"))
             self.ellipsoid = gui.add_dropdown("velocity ellipsoid", ("none", "linear", "angular"))
             self.parts = gui.add_checkbox("acceleration's parts", initial_value=False)
             gui.add_markdown(legend())
         self._build_velocities()
         for handle in (self.frame, self.reference):
-            handle.on_update(lambda _: self._choose())
-        self.dh.on_update(lambda _: self._choose_convention())
+            handle.on_update(lambda _: self._update_dh_table())
+        self.dh.on_update(lambda _: self._update_convention())
         for handle in (
             self.shapes, self.skeleton, self.axes, self.names, self.columns, self.ellipsoid, self.parts
         ):  # fmt: skip
             handle.on_update(lambda _: self.update())
         self.units.on_update(lambda _: self._change_units())
-        self.words_of_q.on_update(self._read_q)
+        self.words_of_q.on_update(self._read_q_field)
         neutral.on_click(lambda _: self.set_q(self._start))
         random.on_click(lambda _: self.set_q(robot.sample(1, int(self._rng.integers(2**31)))[0]))
         camera.on_click(lambda _: self._reset_camera())
@@ -414,7 +414,7 @@ class Viewer:
             vector[at] = value
             setattr(self, letter, vector)
             if letter == "q":
-                self._write_q()
+                self._write_q_field()
             self.update()
 
     def set_q(self, q: ConfigurationLike) -> None:
@@ -433,7 +433,7 @@ class Viewer:
             self.q, self.v, self.a = q.copy(), v.copy(), a.copy()
             for sliders, values in self._sliders_and_values():
                 sliders.show(values)
-            self._write_q()
+            self._write_q_field()
             self.update()
 
     def _sliders_and_values(self) -> list[tuple[Sliders, FloatArray]]:
@@ -445,13 +445,13 @@ class Viewer:
             picture = as_png(client.get_render(height=height, width=width, timeout=60.0))
             client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
 
-    def _write_q(self) -> None:
+    def _write_q_field(self) -> None:
         self.words_of_q.value = format_values(
             self.q if self._conversion is None else self._conversion.to(self.q)
         )
         self.wrong.content = ""
 
-    def _read_q(self, event: Any) -> None:
+    def _read_q_field(self, event: Any) -> None:
         if event.client is None:
             return
         with self._lock:
@@ -475,15 +475,15 @@ class Viewer:
             for sliders, values in self._sliders_and_values():
                 sliders.build(values, degrees=self.units.value == "degrees")
 
-    def _choose_convention(self) -> None:
+    def _update_convention(self) -> None:
         """Make shapes transparent while a table is shown, because frames of the table are inside shapes."""
         with self._lock:
             shown = self.dh.value != "none"
             if self.shapes.value == (SOLID if shown else SEE_THROUGH):
                 self.shapes.value = SEE_THROUGH if shown else SOLID
-            self._choose()
+            self._update_dh_table()
 
-    def _choose(self) -> None:
+    def _update_dh_table(self) -> None:
         with self._lock:
             self._table, words = None, ""
             if self.dh.value != "none":
@@ -496,7 +496,7 @@ class Viewer:
             self.dh_words.content = markdown_text(words)
             self.update()
             if self.player is not None:
-                self.player.check()
+                self.player.check_trajectory()
 
     # -- drawing -------------------------------------------------------------------------------------
 
@@ -513,13 +513,13 @@ class Viewer:
                 names=self.names.value,
             )
             self.stage.move(self.robot.placement(self.q, self.robot.link_frames, verify=False))
-            self._draw(drawn)
+            self._draw_overlays(drawn)
 
     def _motion(self, reference: Reference) -> FrameMotion:
         q, v, a = (x[np.newaxis] for x in (self.q, self.v, self.a))
         return frame_motion(self.robot, (q, v, a), self.frame.value, reference)
 
-    def _draw(self, x: FrameMotion) -> None:
+    def _draw_overlays(self, x: FrameMotion) -> None:
         stage, reach, rates = self.stage, self.stage.reach, self.robot.velocity_names
         columns, ellipsoid = self.columns.value, self.ellipsoid.value
         stage.draw_arrows(

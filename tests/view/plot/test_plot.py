@@ -13,8 +13,8 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot.trajectory import Trajectory, make_line_trajectory
-from urdfkin.view.figure import save
-from urdfkin.view.plot import COORDINATES, PANELS, _line_style, caption, plot_motion
+from urdfkin.view.figure import figure_bytes
+from urdfkin.view.plot import COORDINATE_PANELS, PANELS, _line_style, check_summary, plot_motion
 
 pytest.importorskip("matplotlib")
 Case = tuple[Robot, FrameMotion, Trajectory]
@@ -28,14 +28,14 @@ def case() -> Case:
 
 
 def test_the_title_states_start_and_end_and_every_panel_is_available(case: Case, tmp_path: Path) -> None:
-    assert (*COORDINATES, *PANELS) == OFFERED
+    assert (*COORDINATE_PANELS, *PANELS) == OFFERED
     assert len({tuple(_line_style(k).values()) for k in range(14)}) == 14
     robot, x, trajectory = case
     title = plot_motion(robot, x, trajectory, ["position"]).get_suptitle()
     start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
     assert title.endswith(f"from ({start}) to ({end}) m in 1 s")
     with pytest.raises(InputError, match="unknown picture format"):
-        save(plot_motion(*case, ["position"]), tmp_path / "a.bmp")
+        figure_bytes(plot_motion(*case, ["position"]), tmp_path / "a.bmp")
     with pytest.raises(UnknownNameError, match="velocity"):
         plot_motion(*case, ["velocty"])
 
@@ -150,17 +150,19 @@ def test_a_floating_base_is_plotted_with_position_and_quaternion(tmp_path: Path)
     assert [one.get_ylabel().split("\n")[0] for one in axes] == [
         "q [rad]", "q [m]", "q [quaternion]", "v [rad/s]", "v [m/s]"
     ]  # fmt: skip
-    assert save(plot_motion(robot, motion, x), tmp_path / "a.svg")
+    assert figure_bytes(plot_motion(robot, motion, x), tmp_path / "a.svg")
 
 
 @pytest.mark.slow
 def test_a_plot_contains_every_panel_and_a_footer_about_the_verification(case: Case, tmp_path: Path) -> None:
     robot, x, trajectory = case
-    written = "".join(ET.fromstring(save(plot_motion(robot, x, trajectory), tmp_path / "a.svg")).itertext())
+    written = "".join(
+        ET.fromstring(figure_bytes(plot_motion(robot, x, trajectory), tmp_path / "a.svg")).itertext()
+    )
     panels = "position", "velocity", "parts", "singular", "manipulability", "disagreement"
     for words in (*panels, "verified by"):
         assert words in written
-    assert caption(x, trajectory) in written
+    assert check_summary(x, trajectory) in written
 
 
 @pytest.mark.slow
@@ -168,6 +170,6 @@ def test_a_plot_contains_every_panel_and_a_footer_about_the_verification(case: C
 def test_the_suffix_selects_the_picture_format_and_equal_motions_give_equal_files(
     ending: str, head: bytes, case: Case, tmp_path: Path
 ) -> None:
-    files = [save(plot_motion(*case, ["position"]), tmp_path / f"a.{ending}") for _ in range(2)]
+    files = [figure_bytes(plot_motion(*case, ["position"]), tmp_path / f"a.{ending}") for _ in range(2)]
     assert files[0].startswith(head)
     assert files[0] == files[1]
