@@ -20,8 +20,8 @@ from urdfkin.dh.common_normals import (
     clean_length,
     find_axis_transform,
     match_axis_transforms,
-    match_theta,
     pose_tolerances,
+    reference_or_clean_theta,
     shift_along_z,
     tilt_sine,
 )
@@ -322,7 +322,7 @@ def _match_last_row(
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
     if no_tools and abs(angle_difference(theta, row.theta)) < RIGHT_ANGLE_TOLERANCE:
-        return match_theta(theta, row.theta), d, last, tool
+        return reference_or_clean_theta(theta, row.theta), d, last, tool
     offset = d if row.d else 0.0
     T_tip = joint_transform(theta, d) @ link_transform(last.a, last.alpha) @ tool
     tool = np.linalg.inv(joint_transform(row.theta, offset) @ link_transform(row.a, row.alpha)) @ T_tip
