@@ -44,7 +44,7 @@ from urdfkin.model.tree import FloatArray
 #: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
-_OPTIONS = {
+_OPTION_VALUES = {
     "near_parallel": ("hayati", "strict"),
     "last": ("tip", "flange"),
     "parallel_offset": ("last", "first", "each"),
@@ -68,7 +68,7 @@ class DerivationOptions:
     slide: str = "drawn"
 
     def __post_init__(self) -> None:
-        for name, values in _OPTIONS.items():
+        for name, values in _OPTION_VALUES.items():
             if (value := getattr(self, name)) not in values:
                 remedy = f"write {' or '.join(map(repr, values))}"
                 raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=remedy)
@@ -93,7 +93,9 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
     _place_prismatic_axes(chain, constants, options, reach)
     base, phi_in, delta_in = _find_frame_zero(constants[0], reach, first)
     if like is None:
-        steps, thetas = _find_transforms(constants[1:-1], phi_in, delta_in, reach, options, between)
+        steps, thetas = _find_transforms_and_thetas(
+            constants[1:-1], phi_in, delta_in, reach, options, between
+        )
     else:
         pairs = [
             PairWithReference(A, row, reach, noise, options.hayati)
@@ -251,7 +253,7 @@ def _clean_pose(T: FloatArray, reach: float, noise: float = 0.0) -> None:
     T[:3, 3] = [clean_length(component, reach, noise) for component in T[:3, 3]]
 
 
-def _find_transforms(
+def _find_transforms_and_thetas(
     constants: Sequence[FloatArray],
     phi_in: float,
     delta_in: float,
