@@ -157,13 +157,13 @@ def identify(
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))
     free_parameters = list[int]()
-    for group in model.groups:
+    for group in model.parameter_groups:
         columns = [*free_parameters, *group]
         count = _rank(J[:, columns], error[:, columns]) - len(free_parameters)
         free_parameters += _most_independent(J, free_parameters, group, count)
     fixed = {
         k: _reason(model, J, error, free_parameters, k)
-        for group in model.groups
+        for group in model.parameter_groups
         for k in group
         if k not in free_parameters
     }

@@ -226,11 +226,11 @@ class CalibrationModel:
     """A parametric chain with grouped parameters.
 
     Attributes:
-        groups: Parameter indices of the base, the tool and each joint, in order of preference.
+        parameter_groups: Parameter indices of the base, the tool and each joint, in order of preference.
     """
 
     chain: ParametricChain
-    groups: tuple[tuple[int, ...], ...]
+    parameter_groups: tuple[tuple[int, ...], ...]
     coupling: Coupling
     base: str
     tip: str

@@ -58,7 +58,7 @@ _MAX_ORIENTATION_ERROR = 0.2
 #: If a fit exceeds one of these limits, the module searches for common mistakes in the data.
 #: The first limit is for the rms position error, as a fraction of the reach.
 #: The second limit is for the rms orientation error, rad.
-_SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
+_SUSPECT_ERROR_OF_REACH, _SUSPECT_ORIENTATION_ERROR = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible change of a gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
@@ -69,11 +69,11 @@ _JOINT_VALUE_RESOLUTION = 1e-6
 #: Therefore, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _CHANGE_MARGIN_SIGMAS = 5.0
-#: After a correction of the data, the error of the new fit must be at most
-#:     _NOT_WORSE * (original error)    if the original fit is implausible
-#:     _NOT_WORSE * (original error)    if the original fit changes a joint's zero by about half a turn
-#:     _BETTER * (original error)       otherwise
-_BETTER, _NOT_WORSE = 0.25, 1.5
+#: After a correction of the data, the error of the new fit must be at most ratio * (original error).
+#:     ratio = _MAX_SIMILAR_ERROR_RATIO     if the original fit is implausible
+#:     ratio = _MAX_SIMILAR_ERROR_RATIO     if the original fit changes a joint's zero by about half a turn
+#:     ratio = _MAX_IMPROVED_ERROR_RATIO    otherwise
+_MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
 #: All parameters are fitted for at most this number of corrections from `_corrections`.
 #: The corrections are tried in ascending order of `_Trial.error_before`.
@@ -84,7 +84,7 @@ _MAX_FITS = 4
 _ROW_SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
 #: With too few configurations, urdfkin does not search for a correction of the data.
-_TOO_FEW = "too few different configurations; measure poses at more configurations"
+_TOO_FEW_CONFIGURATIONS = "too few different configurations; measure poses at more configurations"
 
 
 @dataclass(frozen=True)
@@ -230,14 +230,16 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     objections = [*ranges, *misfits, *few]
     metres, turn = fit.full_fit.rms()
     zeros = fit.half_turn_zeros()
-    is_suspect = metres > _SUSPECT * fit.reach or (turn or 0.0) > _SUSPECT_ORIENTATION
+    is_suspect = metres > _SUSPECT_ERROR_OF_REACH * fit.reach or (turn or 0.0) > _SUSPECT_ORIENTATION_ERROR
     better = None
     if not few and (objections or is_suspect or zeros):
         better = _find_likeliest_correction(
-            fit, (_NOT_WORSE if objections or zeros else _BETTER) * fit.residual_deviation(fit.reach)
+            fit,
+            (_MAX_SIMILAR_ERROR_RATIO if objections or zeros else _MAX_IMPROVED_ERROR_RATIO)
+            * fit.residual_deviation(fit.reach),
         )
     if better is None:
-        return Plausibility(tuple(objections), _TOO_FEW if few else None, in_degrees)
+        return Plausibility(tuple(objections), _TOO_FEW_CONFIGURATIONS if few else None, in_degrees)
     if not objections:
         half = f"the zero position changed by half a turn: joint {_join_names(zeros)}; " if zeros else ""
         objections = [
