@@ -36,7 +36,7 @@ def test_a_wrong_d1_is_reported_in_millimetres_with_and_without_a_fit() -> None:
     assert not found.is_exact_unfitted
     assert found.unfitted_metres == pytest.approx(0.01, rel=1e-6)
     assert found.base.metres == pytest.approx(0.01, rel=1e-6)
-    assert (0, "d") in found.hidden
+    assert (0, "d") in found.not_compared
     text = comparison_document(found, parse_units("radians", "millimetres")).text()
     assert "very cell" not in text
     assert "after a fit of base, tool and joint offsets" in text

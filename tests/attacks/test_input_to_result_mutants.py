@@ -79,8 +79,8 @@ CHANGES = [
      "np.stack([*columns, axis], axis=-1)", "-np.stack([*columns, axis], axis=-1)"),
     # a table's URDF
     ("model.path._apply_motion", "motion.turns", "not motion.turns"),
-    ("dh.convert.frame_poses", "row.S @ row.X", "row.X @ row.S"),
-    ("dh.convert.frame_poses", "T_last_tip @ table.tool", "table.tool @ T_last_tip"),
+    ("dh.convert.relative_frame_poses", "row.S @ row.X", "row.X @ row.S"),
+    ("dh.convert.relative_frame_poses", "T_last_tip @ table.tool", "table.tool @ T_last_tip"),
     ("urdf.writer._write_joint", "rpy_of(T[:3, :3])", "rpy_of(T[:3, :3])[::-1]"),
     ("urdf.writer._write_joint", "format_numbers(T[:3, 3])", "format_numbers(T[:3, :3] @ T[:3, 3])"),
     # Pinocchio's side

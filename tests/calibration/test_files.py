@@ -16,11 +16,11 @@ from tests.reading import present
 from tests.urdfs import joint, limit
 from urdfkin.calibration.calibrate import read_poses
 from urdfkin.calibration.universal_robots import (
-    LINKS,
+    PARENT_JOINTS,
     apply_factory_calibration,
-    distance,
+    largest_tip_displacement,
     make_calibrated_tree,
-    read_calibration,
+    read_calibrated_origins,
 )
 from urdfkin.calibration.write_back import nearest_rpy, with_origins
 from urdfkin.dh.rows import table_from_rows
@@ -168,7 +168,7 @@ def drawn_in() -> list[FloatArray]:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     lines = ["kinematics:"]
-    for link, T in zip(LINKS, drawn_in(), strict=True):
+    for link, T in zip(PARENT_JOINTS, drawn_in(), strict=True):
         six = [*T[:3, 3], *euler_of("XYZ", T[:3, :3])]
         named = zip(("x", "y", "z", "roll", "pitch", "yaw"), six, strict=True)
         # The driver writes the shortest digits; YAML 1.1 reads 1e-05 as a string.
@@ -184,12 +184,15 @@ def controller() -> DHTable:
 
 def description(prefix: str) -> str:
     """Return the joints of the ROS description as a URDF."""
-    half_turn, links = f'rpy="0 0 {math.pi}"', ["base_link_inertia", *(f"{link}_link" for link in LINKS)]
+    half_turn, links = (
+        f'rpy="0 0 {math.pi}"',
+        ["base_link_inertia", *(f"{link}_link" for link in PARENT_JOINTS)],
+    )
     parts = [
         joint("base_link-base_link_inertia", "fixed", "base_link", "base_link_inertia", half_turn, ""),
         joint("base_link-base_fixed_joint", "fixed", "base_link", "base", half_turn, ""),
     ]
-    for name, parent, child, origin in zip(LINKS.values(), links, links[1:], NOMINAL, strict=False):
+    for name, parent, child, origin in zip(PARENT_JOINTS.values(), links, links[1:], NOMINAL, strict=False):
         parts.append(joint(name, "revolute", parent, child, origin, more=limit(-6.28, 6.28)))
     text = urdfs.robot(*parts, joint("flange-tool0", "fixed", links[-1], "tool0", axis=""))
     return re.sub(r' (name|link)="', rf' \1="{prefix}', text)
@@ -199,14 +202,14 @@ def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Pa
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 6))
     true = controller().placement(q)
     driver, urdf = (
-        make_chain(make_calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
+        make_chain(make_calibrated_tree(read_calibrated_origins(file, order)), "tool0", "base").placement(q)
         for order in ("driver", "urdf")
     )
     assert np.abs(driver - true).max() < ROUNDING
     assert np.abs(urdf - true).max() > 1e-7
     # Some angles are exactly zero only in the driver's order.
     assert "pitch: 0\n" in file.read_text().replace("-0\n", "0\n")
-    metres, _ = distance(read_calibration(file), read_calibration(file, "urdf"))
+    metres, _ = largest_tip_displacement(read_calibrated_origins(file), read_calibrated_origins(file, "urdf"))
     assert 1e-7 < metres < 1e-4
 
 
@@ -217,7 +220,7 @@ def test_the_calibration_file_is_written_to_the_urdf_of_the_ros_description(pref
     found = apply_factory_calibration(robot, file, "urdf")
     assert present(found.certificate).verified
     written = load(found.text)
-    for (link, name), T in zip(LINKS.items(), drawn_in(), strict=True):
+    for (link, name), T in zip(PARENT_JOINTS.items(), drawn_in(), strict=True):
         here = written.tree.joints[written.tree.joint_index(prefix + name)].T_parent_joint
         assert np.abs(here[:3, 3] - T[:3, 3]).max() < 1e-15, link
     q = written.sample(20)
@@ -267,7 +270,7 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
 def test_an_invalid_calibration_file_is_reported(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "x.yaml").write_text(text)
     with pytest.raises(InputError) as error:
-        read_calibration(tmp_path / "x.yaml")
+        read_calibrated_origins(tmp_path / "x.yaml")
     assert words in str(error.value)
 
 

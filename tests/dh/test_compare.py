@@ -32,13 +32,13 @@ def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, conve
     path = make_chain(elbow(), "tip")
     reference = to_convention(disguised(make_dh_table(elbow(), "tip"), seed), convention)
     found = compare(path, reference)
-    assert found.exact
-    assert found.passes
+    assert found.is_exact
+    assert found.agrees_without_mistakes
     assert found.differences == ()
     assert found.residual <= 1e-13
     q: FloatArray = configurations(6)
-    np.testing.assert_allclose(found.reference.placement(q), path.placement(q), atol=1e-13)
-    assert found.reference.joint_names == path.joint_names
+    np.testing.assert_allclose(found.fitted_table.placement(q), path.placement(q), atol=1e-13)
+    assert found.fitted_table.joint_names == path.joint_names
     # A rotation that base or tool can replace is reported there, and not as a joint offset.
     assert found.offsets[0] == found.offsets[-1] == 0.0
 
@@ -47,7 +47,7 @@ def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, conve
 def test_tables_with_prismatic_joints_are_fitted(kinds: str) -> None:
     tree = elbow(kinds)
     found = compare(make_chain(tree, "tip"), disguised(make_dh_table(tree, "tip"), 3))
-    assert found.exact
+    assert found.is_exact
     assert found.differences == ()
 
 
@@ -71,10 +71,10 @@ def test_the_proven_bound_covers_the_assumed_travel_of_a_joint_without_a_range(l
     path = replace(make_chain(tree, "tip"), joints=(first, replace(second, limit=limit), *others))
     wrong = with_cells(make_dh_table(tree, "tip"), 0, alpha=make_dh_table(tree, "tip").rows[0].alpha + 1e-3)
     found = compare(path, wrong, fit=False)
-    assert found.condition == f"j2 within {ASSUMED_LIMIT:g} m of zero"
+    assert found.range_condition == f"j2 within {ASSUMED_LIMIT:g} m of zero"
     values = np.zeros((2, 6))
     values[:, 1] = -ASSUMED_LIMIT, ASSUMED_LIMIT
-    apart = path.placement(values)[:, :3, 3] - found.reference.placement(values)[:, :3, 3]
+    apart = path.placement(values)[:, :3, 3] - found.fitted_table.placement(values)[:, :3, 3]
     assert 0.009 < np.linalg.norm(apart, axis=-1).max() <= found.metres_bound
 
 
@@ -85,8 +85,8 @@ def test_rounding_at_the_assumed_travel_is_no_difference_on_a_path_of_millimetre
     small = make_serial_tree("arm", tree.links, joints)
     found = compare(make_chain(small, "tip"), make_dh_table(small, "tip"))
     assert found.is_exact_unfitted
-    assert found.exact
-    assert found.unfitted_metres > found.rounding * found.reach
+    assert found.is_exact
+    assert found.unfitted_metres > found.rounding_error * found.reach
 
 
 def shrunk(T: FloatArray) -> FloatArray:
@@ -105,7 +105,7 @@ def test_an_arm_with_many_coinciding_axes_agrees_with_an_equivalent_table(seed: 
         rotation("z", -math.pi / 2) @ shift(0.13, 0, 0) @ rotation("x", 7.9e-5) @ shift(0, 0, 0.45),
         kinds="RRRPRR",
     )
-    assert compare(make_chain(tree, "tip"), disguised(make_dh_table(tree, "tip"), seed)).exact
+    assert compare(make_chain(tree, "tip"), disguised(make_dh_table(tree, "tip"), seed)).is_exact
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -122,7 +122,7 @@ def test_x_beside_a_prismatic_joint_is_perpendicular_to_both_axes(seed: int) -> 
         tip=rotation("z", math.pi / 2) @ shift(0.46, 0, 0.45) @ square @ half,
     )
     reference = disguised(make_dh_table(tree, "tip"), seed)
-    assert compare(make_chain(tree, "tip"), reference).exact
+    assert compare(make_chain(tree, "tip"), reference).is_exact
     assert make_dh_table(tree, "tip", like=reference).rows[3].alpha == pytest.approx(reference.rows[3].alpha)
 
 
@@ -132,7 +132,7 @@ def test_a_table_agrees_with_the_chain_of_the_derivation(tree: KinematicTree, se
     path = make_chain(tree, "tip")
     assume(path.reach > 1e-3)
     found = compare(path, disguised(make_dh_table(tree, "tip"), seed))
-    assert found.metres <= 1e-11 * max(found.reference.span, 1.0)
+    assert found.metres <= 1e-11 * max(found.fitted_table.span, 1.0)
 
 
 CELLS = [(i, cell) for i in range(6) for cell in ("a", "alpha", "d")]
@@ -162,7 +162,7 @@ def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -
 def test_a_cell_that_the_fitted_base_or_tool_compensates_is_no_difference(row: int, cell: str) -> None:
     table = make_dh_table(elbow(), "tip")
     other = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 0.1})
-    assert compare(make_chain(elbow(), "tip"), other).exact
+    assert compare(make_chain(elbow(), "tip"), other).is_exact
 
 
 def test_a_table_of_a_different_robot_differs() -> None:
@@ -240,7 +240,7 @@ def test_the_table_of_a_urdf_agrees_exactly_even_with_nearly_coincident_axes(
     tree = nearly_coincident(seed)
     reference = to_convention(disguised(make_dh_table(tree, "tip"), seed), convention)
     found = compare(make_chain(tree, "tip"), reference)
-    assert found.exact
+    assert found.is_exact
     assert found.differences == ()
 
 
@@ -286,7 +286,7 @@ def test_a_wrong_sign_is_named_alone(name: str) -> None:
         assert found.mistakes[0].fit_changes.count == 0
         assert [(one.row, one.cell) for one in found.differences] == [(row, cell)]
         assert found.unfitted_differences == ()
-        assert not found.passes
+        assert not found.agrees_without_mistakes
 
 
 @pytest.mark.parametrize("name", AS_WRITTEN)
@@ -297,7 +297,7 @@ def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
         found = compare(path, with_cells(table, row, alpha=alpha + math.pi / 2))
         assert [one[:2] for one in named(found)] == [(row, "alpha")]
         assert named(found)[0][2] == pytest.approx(alpha, abs=1e-15)
-        assert not found.passes
+        assert not found.agrees_without_mistakes
 
 
 @pytest.mark.parametrize("name", [pytest.param("kinova", marks=pytest.mark.long), "panda", "ur5"])
@@ -319,9 +319,9 @@ def test_a_correct_table_has_no_mistake(name: str) -> None:
     path, table = published(name)
     found = compare(path, table)
     assert found.mistakes == ()
-    assert found.passes
+    assert found.agrees_without_mistakes
     ends = compare(path, replace(table, base=np.eye(4), tool=np.eye(4)))
-    assert (ends.mistakes, ends.passes) == ((), True)
+    assert (ends.mistakes, ends.agrees_without_mistakes) == ((), True)
 
 
 @pytest.mark.long

@@ -102,8 +102,8 @@ def test_a_bundled_reference_table_agrees_with_the_urdf_to_the_stated_accuracy(n
     text = reference_path(name).read_text()
     assert found.agrees
     assert found.residual <= 1e-12
-    assert ('checked = "exact' in text) == found.exact
-    assert f"{found.metres:.1e} m" in text or found.exact
+    assert ('checked = "exact' in text) == found.is_exact
+    assert f"{found.metres:.1e} m" in text or found.is_exact
     assert 'source = "' in text
 
 

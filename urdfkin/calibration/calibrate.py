@@ -67,20 +67,20 @@ _GENERAL_CONFIGURATIONS = 40
 #: The ratio compares the residuals with the noise that the user stated.
 _NOISE_RATIO_SIGMAS = 4.0
 #: Ratio of uncertainties (`Calibration.poorly_observable`) above which a parameter is poorly observable.
-_POORLY_OBSERVABLE_RATIO = 10.0
+_MAX_UNCERTAINTY_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
 #: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7).
 #: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
-_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
+_ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
 #: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
 _ROUNDING_FACTOR = 4.0
 #: Maximum number of parameters or poses that a warning names.
 _MAX_NAMES = 6
-_NO_REASON = (
+_UNKNOWN_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
 
@@ -134,9 +134,9 @@ class Calibration:
 
         A fixed parameter of a joint has the change 0. A fixed parameter of base or tool has its start value.
         """
-        return self._change(self.full_fit)
+        return self._parameter_changes(self.full_fit)
 
-    def _change(self, fit: Fit | None) -> FloatArray:
+    def _parameter_changes(self, fit: Fit | None) -> FloatArray:
         return (
             np.zeros(len(self.parameters))
             if fit is None
@@ -160,7 +160,7 @@ class Calibration:
     @cached_property
     def written_changes(self) -> FloatArray:
         """Changes (p,) of all parameters in `written_fit`, m and rad. The file can store only some."""
-        return self._change(self.written_fit)
+        return self._parameter_changes(self.written_fit)
 
     @cached_property
     def standard_deviations(self) -> FloatArray:
@@ -214,7 +214,7 @@ class ImplausibleError(InputError):
     def __init__(self, calibration: Calibration, remedy: str | None) -> None:
         """Without `remedy`, the message does not state that the calibration was refused."""
         model, plausibility = calibration.model, calibration.plausibility
-        reason = f"likeliest reason: {plausibility.reason}" if plausibility.reason else _NO_REASON
+        reason = f"likeliest reason: {plausibility.reason}" if plausibility.reason else _UNKNOWN_REASON
         super().__init__(
             "the calibration is not plausible" + (" and was refused" if remedy else ""),
             where=f"{calibration.robot.name}, {model.base} to {model.tip}",
@@ -337,10 +337,10 @@ def fit_model(
     drop_outliers, full_poses = as_bool(drop_outliers, "drop_outliers"), as_bool(full_poses, "full_poses")
     if (q is None) != (poses is None):
         raise InputError("`q` and `poses` must be given together", found="only one of the two")
-    general = _joint_values(model, robot, robot.sample(_GENERAL_CONFIGURATIONS))
+    general = _path_joint_values(model, robot, robot.sample(_GENERAL_CONFIGURATIONS))
     if q is None or poses is None:
         identifiable = identify(
-            model, general, full_poses=full_poses, parameter_values=_general_target(model)
+            model, general, full_poses=full_poses, parameter_values=_values_with_assumed_target(model)
         )
         return Calibration(robot, model, identifiable, identifiable)
     path_q, measurements = _check_measured(robot, model, q, poses)
@@ -359,19 +359,19 @@ def fit_model(
     )
 
 
-def _general_target(model: CalibrationModel) -> FloatArray:
+def _values_with_assumed_target(model: CalibrationModel) -> FloatArray:
     """Return the parameters (p,) of the original model.
 
-    If the tool is fitted, the target is at (L/5, L/6, L/7) in the tip's frame (`_TARGET_DIVISORS`).
+    If the tool is fitted, the target is at (L/5, L/6, L/7) in the tip's frame (`_ASSUMED_TARGET_DIVISORS`).
     """
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.is_base_or_tool and parameter.element == "tool" and parameter.unit == "m":
-            parameter_values[k] = model.chain.characteristic_length / _TARGET_DIVISORS[parameter.name]
+            parameter_values[k] = model.chain.characteristic_length / _ASSUMED_TARGET_DIVISORS[parameter.name]
     return parameter_values
 
 
-def _joint_values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
+def _path_joint_values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
     return model.coupling.values(model.coupling.select(robot.tree, q))
 
 
@@ -515,7 +515,7 @@ def _find_poorly_observable(
     kept: Sequence[int],
     parameter_values: FloatArray,
 ) -> dict[int, float]:
-    general = _joint_values(model, robot, robot.sample(len(measurements), seed=_RANDOM_SEED))
+    general = _path_joint_values(model, robot, robot.sample(len(measurements), seed=_RANDOM_SEED))
     uncertainties = []
     for values in (measurements.joint_values, general):
         J = stack_jacobian(
@@ -526,9 +526,7 @@ def _find_poorly_observable(
             return {}
         uncertainties.append(np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
     ratios = uncertainties[0] / uncertainties[1]
-    return {
-        k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _POORLY_OBSERVABLE_RATIO
-    }
+    return {k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _MAX_UNCERTAINTY_RATIO}
 
 
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
@@ -625,10 +623,10 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
 
 #: Largest accepted error of a rotation matrix or of a quaternion's length; numbers in files are rounded.
 _ROTATION_TOLERANCE = 1e-3
-_POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
-_MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
-_LAST_ROW = tuple(f"T3{j}" for j in range(4))
-UNITS = {"m": 1.0, "mm": 1e-3}
+_POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
+_MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
+_LAST_ROW_COLUMNS = tuple(f"T3{j}" for j in range(4))
+METRES_PER_UNIT = {"m": 1.0, "mm": 1e-3}
 
 
 def read_poses(
@@ -648,17 +646,17 @@ def read_poses(
         Configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), m.
     """
     if path.suffix.lower() == ".npz":
-        q, T = _archive(path, len(coordinates))
+        q, T = _read_npz_poses(path, len(coordinates))
     else:
         default_q = np.zeros(len(coordinates)) if default_q is None else default_q
-        q, T = _table(path, coordinates, required_coordinates, units or {}, default_q)
+        q, T = _read_csv_poses(path, coordinates, required_coordinates, units or {}, default_q)
     T = T.copy()
     positions = T if T.ndim == 2 else T[:, :3, 3]
-    positions *= UNITS[unit]
+    positions *= METRES_PER_UNIT[unit]
     return q, T
 
 
-def _table(
+def _read_csv_poses(
     path: Path,
     coordinates: Sequence[str],
     required_coordinates: Sequence[str],
@@ -668,31 +666,36 @@ def _table(
     text, where = read_text(path, MAX_DATA_BYTES, pipes=True), str(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
-    kind = _MATRIX if "T00" in names else _POSITION
+    kind = _MATRIX_COLUMNS if "T00" in names else _POSITION_COLUMNS
     others = [name for name in coordinates if name not in required_coordinates]
-    optional = [*others, "sample", "t", *(_QUATERNION if kind is _POSITION else _LAST_ROW)]
+    optional = [
+        *others,
+        "sample",
+        "t",
+        *(_QUATERNION_COLUMNS if kind is _POSITION_COLUMNS else _LAST_ROW_COLUMNS),
+    ]
     required = [*required_coordinates, *kind]
     data = read_columns(text, where, "measured poses", required, optional, requires_header=True, units=units)
     s = len(data[kind[0]])
     values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, default_q, strict=True)]
     q = np.stack(values, axis=-1) if values else np.empty((s, 0))
-    part = [name for name in _QUATERNION if name in data]
-    if 0 < len(part) < len(_QUATERNION):
-        missing = ", ".join(name for name in _QUATERNION if name not in part)
+    part = [name for name in _QUATERNION_COLUMNS if name in data]
+    if 0 < len(part) < len(_QUATERNION_COLUMNS):
+        missing = ", ".join(name for name in _QUATERNION_COLUMNS if name not in part)
         raise InputError(
             "a quaternion needs four columns: qx, qy, qz, qw", where=where, found=f"no {missing}"
         )
-    if kind is _MATRIX:
-        rows = np.stack([data[name] for name in _MATRIX], axis=-1).reshape(s, 3, 4)
+    if kind is _MATRIX_COLUMNS:
+        rows = np.stack([data[name] for name in _MATRIX_COLUMNS], axis=-1).reshape(s, 3, 4)
         T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
         return q, _with_exact_rotations(T, where)
-    p = np.stack([data[name] for name in _POSITION], axis=-1)
+    p = np.stack([data[name] for name in _POSITION_COLUMNS], axis=-1)
     return q, p if not part else _with_quaternions(
-        p, np.stack([data[n] for n in _QUATERNION], axis=-1), where
+        p, np.stack([data[n] for n in _QUATERNION_COLUMNS], axis=-1), where
     )
 
 
-def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
+def _read_npz_poses(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
     data = read_arrays(path, {"q": (nq,), "T": (4, 4), "p": (3,), "quat": (4,)}, ["q"])
     if ("T" in data) == ("p" in data) or ("quat" in data and "p" not in data):
         found = ", ".join(data)

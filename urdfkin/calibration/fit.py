@@ -95,7 +95,7 @@ _PIVOT_FRACTION = 0.5
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
 #: The text "same effect as ..." omits fitted parameters with at most this fraction of the effect.
-_EFFECT_FRACTION = 1e-6
+_MIN_EFFECT_FRACTION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -157,13 +157,13 @@ def identify(
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))
     free_parameters = list[int]()
-    for group in model.groups:
+    for group in model.parameter_groups:
         columns = [*free_parameters, *group]
         count = _rank(J[:, columns], error[:, columns]) - len(free_parameters)
         free_parameters += _most_independent(J, free_parameters, group, count)
     fixed = {
         k: _reason(model, J, error, free_parameters, k)
-        for group in model.groups
+        for group in model.parameter_groups
         for k in group
         if k not in free_parameters
     }
@@ -201,7 +201,7 @@ def _reason(
         return "no effect on the measured numbers"
     shares = np.linalg.lstsq(others, column, rcond=None)[0] * np.linalg.norm(others, axis=0)
     shares = np.abs(shares) / np.linalg.norm(column)
-    order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _EFFECT_FRACTION]
+    order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _MIN_EFFECT_FRACTION]
     names = join_names((str(model.chain.parameters[free_parameters[i]]) for i in order), _MAX_NAMES)
     return f"same effect as {names}{' together' if len(order) > 1 else ''}"
 
@@ -214,7 +214,7 @@ def join_names(names: Iterable[str], limit: int) -> str:
 #: `Fit.has_redundancy` is true if the total redundancy is at least this number.
 #: Without rounding errors, the total redundancy is an integer.
 #: Therefore, 0.5 separates 0 from 1 in spite of rounding errors.
-_MIN_REDUNDANCY = 0.5
+_MIN_TOTAL_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
 #: For an eigenvalue of zero, the fit adapts completely to a measurement error along the eigenvector.
 #: The residuals do not show this error.
@@ -300,7 +300,7 @@ class Fit:
 
     @property
     def has_redundancy(self) -> bool:
-        return self.total_redundancy >= _MIN_REDUNDANCY
+        return self.total_redundancy >= _MIN_TOTAL_REDUNDANCY
 
     @property
     def noise_ratio(self) -> float:
@@ -313,7 +313,7 @@ class Fit:
     @property
     def noise_ratio_deviation(self) -> float:
         """The standard deviation of `noise_ratio` if the stated noise is correct."""
-        return 1.0 / math.sqrt(2.0 * max(self.total_redundancy, _MIN_REDUNDANCY))
+        return 1.0 / math.sqrt(2.0 * max(self.total_redundancy, _MIN_TOTAL_REDUNDANCY))
 
     def rms(self) -> tuple[float, float | None]:
         """Return the rms errors of position (m) and orientation (rad)."""
@@ -386,14 +386,14 @@ def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurement
     """
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
-    def of(part: slice, least: float, former: float) -> float:
+    def estimate_deviation(part: slice, minimum: float, default: float) -> float:
         redundancy = float(fit.redundancies[:, part].sum())
         size = float((fit.residuals[:, part] ** 2).sum())
-        return max(math.sqrt(size / redundancy), least) if redundancy > _MIN_REDUNDANCY else former
+        return max(math.sqrt(size / redundancy), minimum) if redundancy > _MIN_TOTAL_REDUNDANCY else default
 
     return Noise(
-        of(slice(0, 3), rounding, fit.noise.metres),
-        of(slice(3, 6), rounding / model.chain.characteristic_length, fit.noise.radians),
+        estimate_deviation(slice(0, 3), rounding, fit.noise.metres),
+        estimate_deviation(slice(3, 6), rounding / model.chain.characteristic_length, fit.noise.radians),
     )
 
 
@@ -404,7 +404,7 @@ class _LeastSquares:
     free_parameters: list[int]
     noise: Noise
 
-    def weighted_residuals(self, parameter_values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def weighted_residuals_and_frames(self, parameter_values: FloatArray) -> tuple[FloatArray, FloatArray]:
         frames = self.model.chain.frames(self.measurements.joint_values, parameter_values)
         residuals = _residuals_of_poses(self.measurements, frames[:, -1])
         return (residuals / self.noise.deviations(self.measurements.full_poses)).ravel(), frames
@@ -423,10 +423,12 @@ class _LeastSquares:
             trial[self.free_parameters] += step
             return trial
 
-        return least_squares(parameter_values, self.weighted_residuals, self.weighted_jacobian, add_step)[0]
+        return least_squares(
+            parameter_values, self.weighted_residuals_and_frames, self.weighted_jacobian, add_step
+        )[0]
 
     def fit(self, parameter_values: FloatArray) -> Fit:
-        r, frames = self.weighted_residuals(parameter_values)
+        r, frames = self.weighted_residuals_and_frames(parameter_values)
         J = self.weighted_jacobian(parameter_values, frames)
         k = self.noise.deviations(self.measurements.full_poses).size
         units = np.linalg.norm(J, axis=0)
@@ -473,26 +475,26 @@ def reject_outliers(
 
 
 def select_significant(
-    changes: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
+    changes: FloatArray, covariance: FloatArray, always_selected: Sequence[bool]
 ) -> NDArray[np.bool_]:
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step sets the least significant change to 0, and updates correlated changes. `fixed` parameters are
-    always selected. Unknown covariances are inf.
+    Each step sets the least significant change to 0, and updates correlated changes. `always_selected` marks
+    the parameters that are selected in any case. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
     """
-    stays, free = np.ones(len(changes), dtype=bool), ~np.array(fixed, dtype=bool)
+    stays, free = np.ones(len(changes), dtype=bool), ~np.array(always_selected, dtype=bool)
     if not np.isfinite(covariance).all():
         return ~free
     x, C = changes.copy(), covariance.copy()
-    while (rest := np.flatnonzero(stays & free)).size:
+    while (candidates := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative.
         # `MIN_DIVISOR` replaces such a variance.
         # The quotient is then very large, and the parameter counts as significant.
-        sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], MIN_DIVISOR))
-        k = rest[int(np.argmin(sizes))]
+        sizes = np.abs(x[candidates]) / np.sqrt(np.maximum(C[candidates, candidates], MIN_DIVISOR))
+        k = candidates[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
             break
         column, variance = C[:, k].copy(), C[k, k]
@@ -513,12 +515,12 @@ def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
 
 #: Maximum number of repetitions in the computation of start values for base and tool.
 #: Each repetition computes the base's rotation, then the positions of base and target.
-_MAX_REPETITIONS = 200
+_MAX_START_REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
 _TARGET_CONVERGENCE = 1e-9
 #: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
 #: If positions are in millimetres by mistake, this quotient is about 1000.
-_LARGEST_SPREAD = 100.0
+_MAX_SPREAD_RATIO = 100.0
 
 
 def estimate_start_values(model: CalibrationModel, measurements: Measurements) -> FloatArray:
@@ -554,29 +556,29 @@ def _from_poses(
 ) -> tuple[FloatArray, FloatArray]:
     B, X = np.eye(4), np.eye(4)
     if base and tool:
-        B[:3, :3], X[:3, :3] = _rotations(T[:, :3, :3], R)
+        B[:3, :3], X[:3, :3] = _solve_base_tool_rotations(T[:, :3, :3], R)
     elif base:
         B[:3, :3] = _nearest_rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
     else:
         X[:3, :3] = _nearest_rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
-    B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
+    B[:3, 3], X[:3, 3] = _solve_base_tool_translations(T, p, B[:3, :3], base, tool)
     return B, X
 
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
     B, X = np.eye(4), np.eye(4)
-    for _ in range(_MAX_REPETITIONS if base and tool else 1):
+    for _ in range(_MAX_START_REPETITIONS if base and tool else 1):
         if base:
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
             B[:3, :3] = _nearest_rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
-        B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
+        B[:3, 3], X[:3, 3] = _solve_base_tool_translations(T, p, B[:3, :3], base, tool)
         if np.linalg.norm(X[:3, 3] - before) <= _TARGET_CONVERGENCE * np.linalg.norm(X[:3, 3]):
             break
     return B, X
 
 
-def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _solve_base_tool_rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve R_B^T M_i = R_i R_X for R_B and R_X.
 
     The linear form is M_i^T R_B - R_X^T R_i^T = 0.
@@ -597,14 +599,14 @@ def _nearest_rotation(M: FloatArray) -> FloatArray:
     return np.asarray(U @ Vt)
 
 
-def _translations(
+def _solve_base_tool_translations(
     T: FloatArray, p: FloatArray, R_B: FloatArray, base: bool, tool: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Solve p_Mi = R_B R_i x + R_B p_i + b for b and x."""
-    rest = (p - T[:, :3, 3] @ R_B.T).ravel()
+    differences = (p - T[:, :3, 3] @ R_B.T).ravel()
     columns = [np.tile(np.eye(3), (len(p), 1))] if base else []
     columns += [(R_B @ T[:, :3, :3]).reshape(-1, 3)] if tool else []
-    found = np.asarray(np.linalg.lstsq(np.hstack(columns), rest, rcond=None)[0], np.float64)
+    found = np.asarray(np.linalg.lstsq(np.hstack(columns), differences, rcond=None)[0], np.float64)
     return found[:3] if base else np.zeros(3), found[-3:] if tool else np.zeros(3)
 
 
@@ -614,7 +616,7 @@ def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)
     )
-    if ours > 0.0 and theirs > _LARGEST_SPREAD * ours:
+    if ours > 0.0 and theirs > _MAX_SPREAD_RATIO * ours:
         raise InputError(
             "the measured positions are much farther apart than the positions of the robot's tip",
             found=f"{theirs:.4g} m, where the robot's tip moves {ours:.4g} m",

@@ -122,7 +122,7 @@ class ParametricChain:
             (s, 4, 4) poses in the base.
         """
         return self.path.poses(
-            self._displacements(
+            self._amounts_and_derivatives(
                 joint_values, self.initial_values if parameter_values is None else parameter_values
             )[0]
         )
@@ -133,7 +133,7 @@ class ParametricChain:
         Returns:
             (s, steps, 4, 4) poses; the last pose is the tip's.
         """
-        return self.path.frames(self._displacements(joint_values, parameter_values)[0])
+        return self.path.frames(self._amounts_and_derivatives(joint_values, parameter_values)[0])
 
     def poses_and_jacobian(
         self,
@@ -148,7 +148,7 @@ class ParametricChain:
         Returns:
             (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
         """
-        amounts, factors = self._displacements(
+        amounts, factors = self._amounts_and_derivatives(
             joint_values, self.initial_values if parameter_values is None else parameter_values
         )
         T, twists = self.path.pose_and_jacobian_from_frames(
@@ -160,7 +160,7 @@ class ParametricChain:
                 columns[:, :, motion.parameter] = factors[:, k, np.newaxis] * twists[:, :, k]
         return T, columns
 
-    def _displacements(
+    def _amounts_and_derivatives(
         self, joint_values: FloatArray, parameter_values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the angle or length of each motion.
@@ -226,11 +226,11 @@ class CalibrationModel:
     """A parametric chain with grouped parameters.
 
     Attributes:
-        groups: Parameter indices of the base, the tool and each joint, in order of preference.
+        parameter_groups: Parameter indices of the base, the tool and each joint, in order of preference.
     """
 
     chain: ParametricChain
-    groups: tuple[tuple[int, ...], ...]
+    parameter_groups: tuple[tuple[int, ...], ...]
     coupling: Coupling
     base: str
     tip: str
@@ -241,7 +241,7 @@ class CalibrationModel:
             parameter.is_base_or_tool and parameter.element == element for parameter in self.chain.parameters
         ):
             return None
-        return self._change(element, parameter_values, is_base_or_tool=True)
+        return self._pose_change(element, parameter_values, is_base_or_tool=True)
 
     def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
         """Return the changed joint origins.
@@ -255,7 +255,7 @@ class CalibrationModel:
         if not isinstance(self.source, KinematicTree):
             return found
         for name in dict.fromkeys(p.element for p in self.chain.parameters if not p.is_base_or_tool):
-            change = self._change(name, parameter_values)
+            change = self._pose_change(name, parameter_values)
             if (change != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
                 A = axis_pose(joint)
@@ -279,11 +279,11 @@ class CalibrationModel:
             return replace(row, theta=theta, d=d, a=a, alpha=alpha, beta=beta)
 
         rows = [update_row(row) for row in self.source.rows]
-        ends = [self._change(end, parameter_values, is_base_or_tool=True) for end in ("base", "tool")]
+        ends = [self._pose_change(end, parameter_values, is_base_or_tool=True) for end in ("base", "tool")]
         T_base, T_tool = ends[0] @ self.source.base, self.source.tool @ ends[1]
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
-    def _change(
+    def _pose_change(
         self, element: str, parameter_values: FloatArray, *, is_base_or_tool: bool = False
     ) -> FloatArray:
         """Return Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz), (4, 4), of a joint, base or tool."""

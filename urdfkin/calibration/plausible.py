@@ -42,7 +42,7 @@ from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, limits_with_margin
 
 #: The rms position error of a plausible fit is at most this fraction of the reach.
-_LARGE_ERROR = 0.05
+_MAX_ERROR_OF_REACH = 0.05
 #: A fit is not plausible if its error is a large fraction of the spread of the measured positions:
 #:     error > _UNEXPLAINED_OF_REACH * reach and error > _UNEXPLAINED_OF_SPREAD * spread
 #:     error     rms position error
@@ -54,26 +54,26 @@ _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
 #:     error_before    rms position error of a fit of base and tool alone
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
-_LARGE_ORIENTATION_ERROR = 0.2
+_MAX_ORIENTATION_ERROR = 0.2
 #: If a fit exceeds one of these limits, the module searches for common mistakes in the data.
 #: The first limit is for the rms position error, as a fraction of the reach.
 #: The second limit is for the rms orientation error, rad.
-_SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
+_SUSPECT_ERROR_OF_REACH, _SUSPECT_ORIENTATION_ERROR = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible change of a gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
 #: Two configurations with equal rounded values count as one configuration.
-_ONE_CONFIGURATION = 1e-6
+_JOINT_VALUE_RESOLUTION = 1e-6
 #: The change of a parameter is implausible if
-#:     |change| - _UNCERTAIN * (standard deviation) > limit.
+#:     |change| - _CHANGE_MARGIN_SIGMAS * (standard deviation) > limit.
 #: Therefore, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
-_UNCERTAIN = 5.0
-#: After a correction of the data, the error of the new fit must be at most
-#:     _NOT_WORSE * (original error)    if the original fit is implausible
-#:     _NOT_WORSE * (original error)    if the original fit changes a joint's zero by about half a turn
-#:     _BETTER * (original error)       otherwise
-_BETTER, _NOT_WORSE = 0.25, 1.5
+_CHANGE_MARGIN_SIGMAS = 5.0
+#: After a correction of the data, the error of the new fit must be at most ratio * (original error).
+#:     ratio = _MAX_SIMILAR_ERROR_RATIO     if the original fit is implausible
+#:     ratio = _MAX_SIMILAR_ERROR_RATIO     if the original fit changes a joint's zero by about half a turn
+#:     ratio = _MAX_IMPROVED_ERROR_RATIO    otherwise
+_MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
 #: All parameters are fitted for at most this number of corrections from `_corrections`.
 #: The corrections are tried in ascending order of `_Trial.error_before`.
@@ -81,10 +81,10 @@ _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.
 #: urdfkin tries these shifts (number of rows).
 #: The number k means that row i + k of q belongs to pose i.
-_SHIFTS = (1, -1, 2, -2)
+_ROW_SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
 #: With too few configurations, urdfkin does not search for a correction of the data.
-_TOO_FEW = "too few different configurations; measure poses at more configurations"
+_TOO_FEW_CONFIGURATIONS = "too few different configurations; measure poses at more configurations"
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class FitWithData:
         return _norm(self.full_fit.residuals, reach) / math.sqrt(max(self.full_fit.total_redundancy, 1.0))
 
     def redundancy_objections(self) -> list[str]:
-        steps = np.round(self.measurements.joint_values / _ONE_CONFIGURATION)
+        steps = np.round(self.measurements.joint_values / _JOINT_VALUE_RESOLUTION)
         distinct, each = len(np.unique(steps, axis=0)), self.full_fit.residuals.shape[1]
         rank = self.identification.rank
         if distinct * each > rank:
@@ -158,18 +158,18 @@ class FitWithData:
         spread = float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum(axis=1).mean()))
         no_better = metres > _NO_BETTER_OF_REACH * reach and metres > _NO_BETTER_OF_BEFORE * metres_before
         unexplained = metres > _UNEXPLAINED_OF_REACH * reach and metres > _UNEXPLAINED_OF_SPREAD * spread
-        if metres > _LARGE_ERROR * reach or no_better or unexplained:
+        if metres > _MAX_ERROR_OF_REACH * reach or no_better or unexplained:
             yield (
                 f"a large rms error of {length(metres)}, which is {metres / reach:.0%} of the reach of"
                 f" {length(reach)} "
                 f"(before the fit {length(metres_before)})"
             )
-        if radians is not None and radians > _LARGE_ORIENTATION_ERROR:
+        if radians is not None and radians > _MAX_ORIENTATION_ERROR:
             yield f"a large rms error of the orientations, {angle(radians)}"
 
     def extreme_parameter_objections(self) -> Iterator[str]:
         tilted, gained = dict[str, str](), dict[str, str]()
-        for parameter, change, least in self._changes():
+        for parameter, change, least in self._joint_parameter_changes():
             if parameter.name in ("rx", "ry", "alpha", "beta") and least > _LARGEST_TILT:
                 tilted.setdefault(parameter.element, f"{parameter.element!r} by {angle(abs(change))}")
             if parameter.name == "gain" and least > _LARGEST_GAIN:
@@ -186,13 +186,13 @@ class FitWithData:
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
-            for parameter, change, least in self._changes()
+            for parameter, change, least in self._joint_parameter_changes()
             if parameter.name in ("rz", "theta")
             and least > _LARGEST_TILT
             and abs(abs(change) - math.pi) < _LARGEST_TILT
         ]
 
-    def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
+    def _joint_parameter_changes(self) -> Iterator[tuple[Parameter, float, float]]:
         """Yield changes of moving joints' parameters.
 
         Yields:
@@ -203,7 +203,7 @@ class FitWithData:
         if not self.measurements.full_poses:
             _, columns = model.chain.poses_and_jacobian(self.measurements.joint_values)
             levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
-            least = _LARGE_ERROR * self.reach
+            least = _MAX_ERROR_OF_REACH * self.reach
             parameters = zip(model.chain.parameters, levers.tolist(), strict=True)
             near = {p.element for p, lever in parameters if p.name in ("rz", "theta") and lever < least}
         deviations = np.sqrt(np.diag(fitted.covariance))
@@ -215,13 +215,13 @@ class FitWithData:
                 and parameter.element not in near
             ):
                 change = float(fitted.parameter_values[k] - model.chain.initial_values[k])
-                yield parameter, change, abs(change) - _UNCERTAIN * deviation
+                yield parameter, change, abs(change) - _CHANGE_MARGIN_SIGMAS * deviation
 
 
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     few = fit.redundancy_objections()
     misfits = [*fit.misfit_objections(), *fit.extreme_parameter_objections()]
-    like_degrees, outside = _out_of_range(fit.model, fit.q)
+    like_degrees, outside = _find_implausible_values(fit.model, fit.q)
     in_degrees = bool(like_degrees) and not radians
     beyond = f"joint values of more than one turn look like degrees: joint {_join_names(like_degrees)}"
     ranges = [beyond] if in_degrees else []
@@ -230,14 +230,16 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     objections = [*ranges, *misfits, *few]
     metres, turn = fit.full_fit.rms()
     zeros = fit.half_turn_zeros()
-    is_suspect = metres > _SUSPECT * fit.reach or (turn or 0.0) > _SUSPECT_ORIENTATION
+    is_suspect = metres > _SUSPECT_ERROR_OF_REACH * fit.reach or (turn or 0.0) > _SUSPECT_ORIENTATION_ERROR
     better = None
     if not few and (objections or is_suspect or zeros):
         better = _find_likeliest_correction(
-            fit, (_NOT_WORSE if objections or zeros else _BETTER) * fit.residual_deviation(fit.reach)
+            fit,
+            (_MAX_SIMILAR_ERROR_RATIO if objections or zeros else _MAX_IMPROVED_ERROR_RATIO)
+            * fit.residual_deviation(fit.reach),
         )
     if better is None:
-        return Plausibility(tuple(objections), _TOO_FEW if few else None, in_degrees)
+        return Plausibility(tuple(objections), _TOO_FEW_CONFIGURATIONS if few else None, in_degrees)
     if not objections:
         half = f"the zero position changed by half a turn: joint {_join_names(zeros)}; " if zeros else ""
         objections = [
@@ -248,9 +250,9 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     return Plausibility(tuple(objections), f"{better.correction.reason} ({corrected})", in_degrees)
 
 
-def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], list[str]]:
+def _find_implausible_values(model: CalibrationModel, q: FloatArray) -> tuple[list[str], list[str]]:
     like_degrees, outside = list[str](), list[str]()
-    for (name, is_angle, lower, upper), column in zip(_coordinates(model), q.T, strict=True):
+    for (name, is_angle, lower, upper), column in zip(_coordinates_with_limits(model), q.T, strict=True):
         largest = float(np.abs(column).max(initial=0.0))
         ends = limits_with_margin(lower, upper)
         is_far = float(column.min()) < ends[0] or float(column.max()) > ends[1]
@@ -262,7 +264,7 @@ def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], li
     return like_degrees, outside
 
 
-def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, float]]:
+def _coordinates_with_limits(model: CalibrationModel) -> Iterator[tuple[str, bool, float, float]]:
     """Yield the path's coordinates.
 
     Yields:
@@ -287,17 +289,18 @@ class _Correction:
     """Configurations after correcting one mistake.
 
     Attributes:
-        first: Index of the pose that belongs to the first row of `q`.
+        first_pose: Index of the pose that belongs to the first row of `q`.
+        end_pose: One more than the index of the pose that belongs to the last row; None: the number of poses.
     """
 
     reason: str
     q: FloatArray
-    first: int = 0
-    last: int | None = None
+    first_pose: int = 0
+    end_pose: int | None = None
 
 
 def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction]:
-    is_angle = np.array([is_angle for _, is_angle, *_ in _coordinates(model)], dtype=bool)
+    is_angle = np.array([is_angle for _, is_angle, *_ in _coordinates_with_limits(model)], dtype=bool)
     if is_angle.any():
         yield _Correction(
             "joint angles are in degrees; convert them to radians", np.where(is_angle, np.radians(q), q)
@@ -311,16 +314,16 @@ def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction
             "values of prismatic joints are in millimetres; convert them to metres",
             np.where(is_angle, q, 1e-3 * q),
         )
-    for by in _SHIFTS:
-        if len(q) > abs(by) + 1:
-            rows = "one row" if abs(by) == 1 else f"{abs(by)} rows"
-            sign = "+" if by > 0 else "-"
+    for shift in _ROW_SHIFTS:
+        if len(q) > abs(shift) + 1:
+            rows = "one row" if abs(shift) == 1 else f"{abs(shift)} rows"
+            sign = "+" if shift > 0 else "-"
             reason = (
                 f"q is shifted by {rows} relative to the poses; the correct q of pose i is in row i {sign}"
-                f" {abs(by)}"
+                f" {abs(shift)}"
             )
-            shifted = q[by:] if by > 0 else q[:by]
-            yield _Correction(reason, shifted, max(-by, 0), len(q) - max(by, 0))
+            shifted = q[shift:] if shift > 0 else q[:shift]
+            yield _Correction(reason, shifted, max(-shift, 0), len(q) - max(shift, 0))
     for j in range(len(model.coupling.names)):
         yield _with_signs(model, q, np.where(np.arange(q.shape[1]) == j, -1.0, 1.0))
 
@@ -367,7 +370,7 @@ class _Trial:
     def __init__(self, original: FitWithData, correction: _Correction) -> None:
         self.original, self.correction = original, correction
         model, poses = original.model, np.zeros(len(original.measurements), dtype=bool)
-        poses[correction.first : correction.last] = True
+        poses[correction.first_pose : correction.end_pose] = True
         chosen = original.measurements.select(poses)
         self.measurements = Measurements(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = estimate_start_values(model, self.measurements)

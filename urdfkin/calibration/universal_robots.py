@@ -43,7 +43,7 @@ from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
 #: Parent joint of each link in the calibration file, from base to tip.
-LINKS = {
+PARENT_JOINTS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
     "forearm": "elbow_joint",
@@ -53,8 +53,8 @@ LINKS = {
 }
 #: Order of the rotations by roll, pitch and yaw, in SciPy's notation.
 #: Uppercase letters mean moving axes, and lowercase letters mean fixed axes.
-ORDERS = {"driver": "XYZ", "urdf": "xyz"}
-_SIX = ("x", "y", "z", "roll", "pitch", "yaw")
+ROTATION_ORDERS = {"driver": "XYZ", "urdf": "xyz"}
+_ORIGIN_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Number of random configurations for the fit of the joint origins.
 #: The check of the new URDF uses the same number of configurations.
 _FIT_SAMPLES = 40
@@ -62,10 +62,10 @@ _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, in metres and in radians.
 #: The calibration file rounds numbers to nine digits, which causes residuals near this limit.
 _MAX_RESIDUAL = 1e-8
-_DISTANCE_SAMPLES = 1000
+_DISPLACEMENT_SAMPLES = 1000
 
 
-def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
+def read_calibrated_origins(path: Path, order: str = "driver") -> dict[str, FloatArray]:
     """Read joint origins from a YAML file.
 
     The file is the calibration file of the driver, or a `default_kinematics.yaml`.
@@ -73,8 +73,8 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
     Returns:
         (4, 4) origins by joint name.
     """
-    if order not in ORDERS:
-        raise UnknownNameError("order of rotations", order, ORDERS)
+    if order not in ROTATION_ORDERS:
+        raise UnknownNameError("order of rotations", order, ROTATION_ORDERS)
     try:
         data = yaml.safe_load(read_text(path, pipes=True))
     except (yaml.YAMLError, RecursionError) as error:
@@ -88,15 +88,18 @@ def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]
             where=str(path),
             remedy="use the calibration file of the driver, which begins with kinematics: shoulder: x: ...",
         )
-    return {joint: _origin(kinematics, link, ORDERS[order], str(path)) for link, joint in LINKS.items()}
+    return {
+        joint: _parse_origin(kinematics, link, ROTATION_ORDERS[order], str(path))
+        for link, joint in PARENT_JOINTS.items()
+    }
 
 
-def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str) -> FloatArray:
+def _parse_origin(kinematics: Mapping[Any, Any], link: str, rotation_order: str, where: str) -> FloatArray:
     entry = kinematics.get(link)
     if not isinstance(entry, Mapping):
         raise InputError("the calibration file lacks a link", where=where, found=f"no {link}")
     six = []
-    for name in _SIX:
+    for name in _ORIGIN_KEYS:
         # The driver writes 0.00001 as 1e-05, which YAML 1.1 reads as a string.
         # The message names only the type of a list, because a list with YAML references can be very long.
         value = entry.get(name)
@@ -105,7 +108,7 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
             found = repr(value)[:60] if isinstance(value, float | str) else type(value).__name__
             raise InputError("this is not a finite number", where=f"{where}, {link} {name}", found=found)
         six.append(number)
-    return pose(rotation_from_euler(sequence, six[3:]), six[:3])
+    return pose(rotation_from_euler(rotation_order, six[3:]), six[:3])
 
 
 def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
@@ -125,7 +128,7 @@ def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "d
     calibrated arm.
     """
     robot = as_robot(robot)
-    origins = read_calibration(path, order)
+    origins = read_calibrated_origins(path, order)
     prefix = _prefix(robot)
     calibrated = make_chain(make_calibrated_tree(origins), "tool0", "base")
     if _all_turn_about_z(robot, prefix):
@@ -162,20 +165,24 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> U
 
 
 def _prefix(robot: Robot) -> str:
-    first = next(iter(LINKS.values()))
+    first = next(iter(PARENT_JOINTS.values()))
     prefixes = [name.removesuffix(first) for name in robot.joint_names if name.endswith(first)]
-    if len(prefixes) != 1 or any(prefixes[0] + joint not in robot.joint_names for joint in LINKS.values()):
+    if len(prefixes) != 1 or any(
+        prefixes[0] + joint not in robot.joint_names for joint in PARENT_JOINTS.values()
+    ):
         raise InputError(
             "the robot is not a Universal Robots arm",
             where=robot.name,
             found=f"joints {', '.join(robot.joint_names[:8])}",
-            remedy=f"its joints must be {', '.join(LINKS.values())}, with one common prefix",
+            remedy=f"its joints must be {', '.join(PARENT_JOINTS.values())}, with one common prefix",
         )
     return prefixes[0]
 
 
 def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
-    axes = [robot.tree.joints[robot.tree.joint_index(prefix + joint)].axis for joint in LINKS.values()]
+    axes = [
+        robot.tree.joints[robot.tree.joint_index(prefix + joint)].axis for joint in PARENT_JOINTS.values()
+    ]
     return all(axis.tolist() == [0.0, 0.0, 1.0] for axis in axes)
 
 
@@ -184,7 +191,7 @@ def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) ->
     written = result.new_robot
     q = written.sample(_FIT_SAMPLES, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
-    values = q[:, [written.coordinate_names.index(prefix + joint) for joint in LINKS.values()]]
+    values = q[:, [written.coordinate_names.index(prefix + joint) for joint in PARENT_JOINTS.values()]]
     error = float(np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - calibrated.placement(values)).max())
     if error > _MAX_RESIDUAL:
         raise InputError(
@@ -196,7 +203,9 @@ def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) ->
     return written.certificate()
 
 
-def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
+def largest_tip_displacement(
+    first_origins: Mapping[str, FloatArray], second_origins: Mapping[str, FloatArray]
+) -> tuple[float, float]:
     """Return the largest sampled displacement between the `tool0` frames of two arms.
 
     The returned angle is 2 sin(angle / 2), which is accurate only for small angles.
@@ -204,8 +213,11 @@ def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> 
     Returns:
         Distance, m, and angle, rad.
     """
-    paths = [make_chain(make_calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
-    q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _DISTANCE_SAMPLES)
+    paths = [
+        make_chain(make_calibrated_tree(origins), "tool0", "base")
+        for origins in (first_origins, second_origins)
+    ]
+    q = sample_uniform([(-np.pi, np.pi)] * len(PARENT_JOINTS), _DISPLACEMENT_SAMPLES)
     T, S = (path.placement(q) for path in paths)
     turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
     angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)

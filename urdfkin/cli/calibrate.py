@@ -250,14 +250,16 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> UpdatedURDF:
     from urdfkin.calibration.universal_robots import (
-        ORDERS,
+        ROTATION_ORDERS,
         apply_factory_calibration,
-        distance,
-        read_calibration,
+        largest_tip_displacement,
+        read_calibrated_origins,
     )
     from urdfkin.comparison.result import angle, length
 
-    metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
+    metres, radians = largest_tip_displacement(
+        *(read_calibrated_origins(path, one) for one in ROTATION_ORDERS)
+    )
     say(
         f"using --order {order}; with the other value of --order, the pose of the tool differs by up to"
         f" {length(metres)} and {angle(radians)} (docs/calibration.md)",

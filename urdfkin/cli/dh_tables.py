@@ -257,7 +257,7 @@ def _make_comparison_answer(request: DHRequest, name: str) -> Answer:
         lock = [line] if (line := locked_line(request.robot)) else []
         parts = [*notes, *lock, Strong(document.title), *document.parts, *hints]
         text = TextDocument("", parts).render(request.format_)
-    return _make_answer(request, text, 0 if found.passes else 1)
+    return _make_answer(request, text, 0 if found.agrees_without_mistakes else 1)
 
 
 def _better_interpretation(
@@ -283,15 +283,15 @@ def _comparison_data(
     found: TableComparison, reference: DHTable, mistake: BetterInterpretation | None
 ) -> dict[str, Any]:
     return {
-        "passes": found.passes,
+        "passes": found.agrees_without_mistakes,
         "agrees": found.agrees,
-        "exact": found.exact,
+        "exact": found.is_exact,
         "read_as": str(reference.convention),
         "tip_off_at_most_m": found.metres,
         "tip_turned_at_most_rad": found.radians,
         "proven_tip_off_at_most_m": found.metres_bound,
         "proven_tip_turned_at_most_rad": found.radians_bound,
-        "proven_if": found.condition or None,
+        "proven_if": found.range_condition or None,
         "as_written_tip_off_at_most_m": found.unfitted_metres,
         "as_written_tip_turned_at_most_rad": found.unfitted_radians,
         "base_took_up": {"metres": found.base.metres, "radians": found.base.radians},
@@ -300,12 +300,12 @@ def _comparison_data(
         "samples": found.samples,
         "senses": list(found.senses),
         "offsets": list(found.offsets),
-        "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
+        "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.not_compared],
         "differences": [_difference_data(one) for one in found.differences],
         "likely_mistakes": [_mistake_data(one) for one in found.mistakes],
         "would_fit_read_as": mistake and mistake.as_mapping(),
         "without_fitting": [_difference_data(one) for one in found.unfitted_differences],
-        "fitted": to_mapping(found.reference),
+        "fitted": to_mapping(found.fitted_table),
     }
 
 

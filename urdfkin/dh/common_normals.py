@@ -45,7 +45,7 @@ from urdfkin.model.tree import FloatArray, Joint
 NEARLY_PARALLEL = 1e-2
 
 #: Two axes get a Hayati row only if the sine of their tilt is below this number.
-MAX_HAYATI_TILT = 0.35
+MAX_HAYATI_TILT_SINE = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ def find_axis_transform(
         return _find_parallel_transform(A, reach, noise, default_phi, offset_in_delta)
     step = _find_normal_transform(A, sine, reach, noise)
     is_far = max(abs(step.delta), abs(step.delta_next)) > reach
-    is_near_parallel = sine < NEARLY_PARALLEL or (sine < MAX_HAYATI_TILT and is_far)
+    is_near_parallel = sine < NEARLY_PARALLEL or (sine < MAX_HAYATI_TILT_SINE and is_far)
     if hayati and is_near_parallel:
         return find_hayati_transform(A, reach, noise, default_phi)
     return step
@@ -194,14 +194,14 @@ class PairWithReference:
     @property
     def offset_is_free(self) -> bool:
         """Whether the axes do not determine d: parallel axes, or a Hayati row."""
-        return tilt_sine(self.A) <= self.noise.radians or self._has_hayati_row
+        return tilt_sine(self.A) <= self.noise.radians or self._needs_hayati_row
 
     @property
-    def _has_hayati_row(self) -> bool:
+    def _needs_hayati_row(self) -> bool:
         sine = tilt_sine(self.A)
         reference_is_strict = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
         return self.hayati and (
-            sine < NEARLY_PARALLEL or (sine < MAX_HAYATI_TILT and not reference_is_strict)
+            sine < NEARLY_PARALLEL or (sine < MAX_HAYATI_TILT_SINE and not reference_is_strict)
         )
 
     @property
@@ -247,7 +247,7 @@ class PairWithReference:
             step = find_hayati_transform(A, self.reach, self.noise, default_phi)
         return replace(step, delta=step.delta + d) if d else step
 
-    def offset_before(self, delta_next: float) -> float:
+    def delta_in_for_zero_d(self, delta_next: float) -> float:
         """Return the `delta_in` for which d is 0."""
         return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
@@ -265,7 +265,7 @@ def match_axis_transforms(
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
-        inputs.append((delta_in, _choose_offset(pairs, i, delta_in, tip_offset)))
+        inputs.append((delta_in, _choose_d(pairs, i, delta_in, tip_offset)))
         steps.append(pair.find_transform(*inputs[-1]))
         delta_in = steps[-1].delta_next
     thetas = []
@@ -274,14 +274,12 @@ def match_axis_transforms(
             steps[i] = pair.find_transform(*inputs[i], _choose_phi(pairs, steps, i, phi_in))
         else:
             steps[i] = _choose_direction(steps[i], pair, phi_in)
-        thetas.append(match_theta(phi_in + steps[i].phi, pair.row.theta))
+        thetas.append(reference_or_clean_theta(phi_in + steps[i].phi, pair.row.theta))
         phi_in = steps[i].phi_next
     return steps, thetas
 
 
-def _choose_offset(
-    pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None
-) -> float:
+def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None) -> float:
     """Choose d of row i.
 
         axes determine d                              any number, because `find_transform` ignores d
@@ -310,8 +308,8 @@ def _choose_offset(
             return clean_length(delta_in + hayati_offset, pair.reach, pair.noise.metres)
         target = pairs[end].row.d - hayati_offset
     for later in reversed(pairs[i + 1 : end]):
-        target = later.row.d + later.offset_before(target)
-    return clean_length(delta_in - pair.offset_before(target), pair.reach, pair.noise.metres)
+        target = later.row.d + later.delta_in_for_zero_d(target)
+    return clean_length(delta_in - pair.delta_in_for_zero_d(target), pair.reach, pair.noise.metres)
 
 
 def _choose_phi(
@@ -348,7 +346,7 @@ def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
     return min((step, step.with_reversed_x()), key=difference)
 
 
-def match_theta(theta: float, reference: float) -> float:
+def reference_or_clean_theta(theta: float, reference: float) -> float:
     return (
         reference if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS else clean_angle(theta)
     )

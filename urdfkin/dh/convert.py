@@ -102,7 +102,7 @@ def make_serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) 
 def _serial_joints(
     table: DHTable, details: list[tuple[JointKind, Limit | None, Mimic | None]]
 ) -> list[Joint]:
-    *poses, T_tip = frame_poses(table)
+    *poses, T_tip = relative_frame_poses(table)
     joints = [
         Joint(row.joint, kind, 0, T, np.array([0.0, 0.0, float(row.sense)]), limit, mimic)
         for row, T, (kind, limit, mimic) in zip(table.rows, poses, details, strict=True)
@@ -111,7 +111,7 @@ def _serial_joints(
     return [*joints, Joint(name, JointKind.FIXED, 0, T_tip, np.array([1.0, 0.0, 0.0]))]
 
 
-def frame_poses(table: DHTable) -> list[FloatArray]:
+def relative_frame_poses(table: DHTable) -> list[FloatArray]:
     """Return each frame's pose in the previous frame.
 
     The last frame is the tip. All joints are at zero.

@@ -20,8 +20,8 @@ from urdfkin.dh.common_normals import (
     clean_length,
     find_axis_transform,
     match_axis_transforms,
-    match_theta,
     pose_tolerances,
+    reference_or_clean_theta,
     shift_along_z,
     tilt_sine,
 )
@@ -44,7 +44,7 @@ from urdfkin.model.tree import FloatArray
 #: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
-_OPTIONS = {
+_OPTION_VALUES = {
     "near_parallel": ("hayati", "strict"),
     "last": ("tip", "flange"),
     "parallel_offset": ("last", "first", "each"),
@@ -68,7 +68,7 @@ class DerivationOptions:
     slide: str = "drawn"
 
     def __post_init__(self) -> None:
-        for name, values in _OPTIONS.items():
+        for name, values in _OPTION_VALUES.items():
             if (value := getattr(self, name)) not in values:
                 remedy = f"write {' or '.join(map(repr, values))}"
                 raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=remedy)
@@ -93,7 +93,9 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
     _place_prismatic_axes(chain, constants, options, reach)
     base, phi_in, delta_in = _find_frame_zero(constants[0], reach, first)
     if like is None:
-        steps, thetas = _find_transforms(constants[1:-1], phi_in, delta_in, reach, options, between)
+        steps, thetas = _find_transforms_and_thetas(
+            constants[1:-1], phi_in, delta_in, reach, options, between
+        )
     else:
         pairs = [
             PairWithReference(A, row, reach, noise, options.hayati)
@@ -251,7 +253,7 @@ def _clean_pose(T: FloatArray, reach: float, noise: float = 0.0) -> None:
     T[:3, 3] = [clean_length(component, reach, noise) for component in T[:3, 3]]
 
 
-def _find_transforms(
+def _find_transforms_and_thetas(
     constants: Sequence[FloatArray],
     phi_in: float,
     delta_in: float,
@@ -322,7 +324,7 @@ def _match_last_row(
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
     if no_tools and abs(angle_difference(theta, row.theta)) < RIGHT_ANGLE_TOLERANCE:
-        return match_theta(theta, row.theta), d, last, tool
+        return reference_or_clean_theta(theta, row.theta), d, last, tool
     offset = d if row.d else 0.0
     T_tip = joint_transform(theta, d) @ link_transform(last.a, last.alpha) @ tool
     tool = np.linalg.inv(joint_transform(row.theta, offset) @ link_transform(row.a, row.alpha)) @ T_tip

@@ -25,11 +25,11 @@ from urdfkin.model.tree import KinematicTree
 #: If alpha, a or d differ by more than this number, two tables describe different robots.
 #: Cells are ignored if base, tool or a prismatic axis can compensate for their difference.
 #: Angles are in rad, and lengths are relative to the reach.
-_MAX_DIFFERENCE = 0.1
+_MAX_CELL_DIFFERENCE = 0.1
 #: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
-_ZERO_TOLERANCE = 1e-2
+_SAME_ANGLE_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
-_ROUNDING = 1e-12
+_MIN_CELL_DIFFERENCE = 1e-12
 #: These options follow from the published table if the argument `like` is given.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
@@ -59,7 +59,7 @@ def find_reversed_joints(
         table = derive(chain, replace(options, convention=DHConvention.STANDARD, flip=flip), standard)
         if (key := _difference_key(table, standard, chain.reach or 1.0)) < best:
             best, best_flip = key, flip
-    if best[0] > _MAX_DIFFERENCE:
+    if best[0] > _MAX_CELL_DIFFERENCE:
         raise InputError(
             "the table in the argument `like` describes a different robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
@@ -85,12 +85,12 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
             unique = max(unique, abs(row.d - other.d) / reach)
         elif 0 < i < n - 1:
             shiftable = max(shiftable, theta)
-        zeros += (theta > _ZERO_TOLERANCE) + (row.d * other.d < 0.0)
+        zeros += (theta > _SAME_ANGLE_TOLERANCE) + (row.d * other.d < 0.0)
     ends = sum(
-        float(np.abs(T[:3, :3] - T_reference[:3, :3]).max() > _ZERO_TOLERANCE)
+        float(np.abs(T[:3, :3] - T_reference[:3, :3]).max() > _SAME_ANGLE_TOLERANCE)
         for T, T_reference in ((table.base, reference.base), (table.tool, reference.tool))
     )
-    power = math.ceil(math.log10(max(unique, shiftable, _ROUNDING)))
+    power = math.ceil(math.log10(max(unique, shiftable, _MIN_CELL_DIFFERENCE)))
     return round(unique, 2), power, zeros, ends, sum(row.sense < 0 for row in table.rows)
 
 

@@ -34,9 +34,9 @@ from urdfkin.system.files import may_exist, read_text
 from urdfkin.system.resources import robots_dir
 
 #: Tolerance of a rotation that is printed with six digits.
-_PRINTED_TOLERANCE = 1e-5
+_PRINTED_ROTATION_TOLERANCE = 1e-5
 #: Blank lines and Markdown fences may separate the heading and the three rows of a printed pose.
-_POSE_LINES = 6
+_MAX_POSE_LINES = 6
 #: A line such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: A line `# key: value` in CSV, with any key.
@@ -53,7 +53,7 @@ _NAMES = {
     **dict.fromkeys(("joint", "name", "joint name"), "joint"),
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
 }
-_KINDS = {"0": "R", "1": "P"}
+_KINDS_BY_SIGMA = {"0": "R", "1": "P"}
 _ROW_NUMBERS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
 _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
@@ -95,7 +95,7 @@ def find_table_in_text(text: str) -> dict[str, Any]:
         if end not in data and (pose := _parse_pose(end, grid.other_lines)):
             data[end] = pose
     data["rows"] = [_parse_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
-    _interpret_variables(data, _parse_coordinate_names(grid.other_lines))
+    _replace_mimic_variables(data, _parse_coordinate_names(grid.other_lines))
     return data
 
 
@@ -121,14 +121,14 @@ class _Grid:
     Attributes:
         other_lines: Lines outside the table.
         decimal_commas: Whether a comma in a number can be a decimal comma.
-        strict: Whether an unknown column is an error.
+        rejects_unknown_columns: Whether an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
     rows: list[list[str]]
     other_lines: list[str]
     decimal_commas: bool = False
-    strict: bool = False
+    rejects_unknown_columns: bool = False
 
     @property
     def has_clear_decimal_comma(self) -> bool:
@@ -238,14 +238,14 @@ def _split_csv_line(line: str, separator: str) -> list[str]:
 def _parse_aligned(lines: list[str]) -> _Grid | None:
     """Try two or more blanks between cells, then one blank."""
 
-    def loose(line: str) -> list[str]:
+    def split_at_two_blanks(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
 
-    def tight(line: str) -> list[str]:
+    def split_at_one_blank(line: str) -> list[str]:
         joined = re.sub(r"\s*([-+*/])\s+(?=\S)", r"\1", line.strip())
         return re.sub(r"\s+([\[(])", r"\1", joined).split()
 
-    return _find_grid(lines, loose) or _find_grid(lines, tight)
+    return _find_grid(lines, split_at_two_blanks) or _find_grid(lines, split_at_one_blank)
 
 
 def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
@@ -314,7 +314,7 @@ def _parse_pose(end: str, lines: list[str]) -> list[list[float]] | None:
         )
     for k, line in enumerate(lines):
         if line.strip().lower().startswith(f"{end} (metres):"):
-            rows = [row.split() for row in lines[k + 1 : k + 1 + _POSE_LINES] if row.strip(" `")][:3]
+            rows = [row.split() for row in lines[k + 1 : k + 1 + _MAX_POSE_LINES] if row.strip(" `")][:3]
             if len(rows) == 3 and all(len(row) == 4 for row in rows):
                 return _nearest_rigid([[float(number) for number in row] for row in rows], end)
     return None
@@ -326,7 +326,7 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     correction = polar_factor(pose[:3, :3]) - pose[:3, :3]
-    if UNCHANGED_MATRIX_TOLERANCE < np.abs(correction).max() < _PRINTED_TOLERANCE:
+    if UNCHANGED_MATRIX_TOLERANCE < np.abs(correction).max() < _PRINTED_ROTATION_TOLERANCE:
         pose[:3, :3] += correction
     return [[float(number) for number in row] for row in pose]
 
@@ -343,7 +343,7 @@ def _parse_coordinate_names(lines: list[str]) -> list[str]:
 def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
-        if not column.name and grid.strict and column.heading not in _ROW_NUMBERS:
+        if not column.name and grid.rejects_unknown_columns and column.heading not in _ROW_NUMBERS:
             row[column.heading] = cell  # `table_from_mapping` rejects this heading.
         elif not column.name or (not cell and column.name not in COLUMNS):
             continue
@@ -351,7 +351,7 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             where = f"row {index + 1}, {column.name}"
             row[column.name] = _add_unit(cell, column, where, grid)
         elif column.name == "kind":
-            row["kind"] = _KINDS.get(cell, cell)
+            row["kind"] = _KINDS_BY_SIGMA.get(cell, cell)
         else:
             row[column.name] = (
                 from_csv_cell(_unescape(cell)) if column.name in ("joint", "mimicked_joint") else cell
@@ -398,7 +398,7 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
     return {**row, **({"mimic": mimic} if mimic else {}), **({"limit": limit} if limit else {})}
 
 
-def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
+def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace another joint's variable by a mimic rule.
 
     Variable qi is the i-th name in `coordinates`; without names, the joint of row i.
@@ -409,9 +409,9 @@ def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     for i, row in enumerate(rows):
         for name in ("theta", "d"):
             cell = parse_cell(row[name])
-            if cell.factor is None:
+            if cell.variable_factor is None:
                 continue
-            if not coordinates and cell.variable in (None, i + 1) and abs(cell.factor) == 1.0:
+            if not coordinates and cell.variable in (None, i + 1) and abs(cell.variable_factor) == 1.0:
                 continue  # `table_from_mapping` interprets the row's own variable.
             number = cell.variable or i + 1
             if number > len(names):
@@ -421,10 +421,10 @@ def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
                     found=row[name],
                 )
             row |= {"kind": row.get("kind", "R" if name == "theta" else "P"), name: cell.constant}
-            if names[number - 1] == joints[i] and abs(cell.factor) == 1.0:
-                row["sense"] = cell.factor
+            if names[number - 1] == joints[i] and abs(cell.variable_factor) == 1.0:
+                row["sense"] = cell.variable_factor
             else:
-                row["mimic"] = {"mimicked_joint": names[number - 1], "multiplier": cell.factor}
+                row["mimic"] = {"mimicked_joint": names[number - 1], "multiplier": cell.variable_factor}
     if elsewhere := [name for name in coordinates if name not in joints]:
         data.setdefault("coordinates", elsewhere)
 
@@ -438,7 +438,10 @@ def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
     """Whether a source is a table file; a .txt file that begins with "<" is a URDF."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
-    if not isinstance(source, str | os.PathLike) or (suffix := Path(source).suffix.lower()) not in _PARSERS:
+    if (
+        not isinstance(source, str | os.PathLike)
+        or (suffix := Path(source).suffix.lower()) not in _PARSERS_BY_SUFFIX
+    ):
         return False
     return suffix != ".txt" or not _is_markup(Path(source))
 
@@ -487,15 +490,15 @@ def _add_place(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any],
 
 
 def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
-    if suffix not in _PARSERS:
+    if suffix not in _PARSERS_BY_SUFFIX:
         raise InputError(
-            f"a table file must have the suffix {', '.join(_PARSERS)}",
+            f"a table file must have the suffix {', '.join(_PARSERS_BY_SUFFIX)}",
             where=where,
             found=repr(suffix),
             remedy="rename the file",
         )
     try:
-        data = _PARSERS[suffix](text)
+        data = _PARSERS_BY_SUFFIX[suffix](text)
     except UrdfkinError as error:
         error.where = f"{where}, {error.where}"
         raise
@@ -517,7 +520,7 @@ def _is_markup(path: Path) -> bool:
         return False
 
 
-_PARSERS: dict[str, Callable[[str], Any]] = {
+_PARSERS_BY_SUFFIX: dict[str, Callable[[str], Any]] = {
     ".toml": partial(tomllib.loads, parse_float=NumberWithText),
     ".json": partial(json.loads, parse_float=NumberWithText),
     **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), find_table_in_text),

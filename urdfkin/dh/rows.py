@@ -136,17 +136,22 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
     )
 
 
-def _check_order(rows: Sequence[Any]) -> None:
+def _check_column_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
     A column of angles usually contains multiples of 15 (degrees) or of pi/12 (radians).
     A column of lengths rarely contains such a multiple, except 0.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
-    if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):
+    if len(lists) < len(rows) or not all(_has_list_form(row) for row in lists):
         return
     first, second, _, fourth = ([row[k] for row in lists if row[k] != 0] for k in range(4))
-    if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
+    if (
+        second
+        and fourth
+        and not any(map(_looks_like_round_angle, second))
+        and all(map(_looks_like_round_angle, [*first, *fourth]))
+    ):
         raise InputError(
             "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
             f" {', '.join(COLUMNS)}",
@@ -162,11 +167,11 @@ def parse_name(value: Any, where: str) -> str:
     return value
 
 
-def _has_column_order(row: Sequence[Any]) -> bool:
+def _has_list_form(row: Sequence[Any]) -> bool:
     return len(row) == len(COLUMNS) or (len(row) == len(COLUMNS) + 1 and isinstance(row[-1], str))
 
 
-def _looks_round(value: Any) -> bool:
+def _looks_like_round_angle(value: Any) -> bool:
     if isinstance(value, str):
         return "pi" in value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -213,7 +218,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
     """
     texts = {name: fields[name] for name in COLUMNS if isinstance(fields.get(name), str)}
     cells = {name: _parse_cell_text(text, f"{where}, {name}") for name, text in texts.items()}
-    variables = [name for name, cell in cells.items() if cell.factor is not None]
+    variables = [name for name, cell in cells.items() if cell.variable_factor is not None]
     if not variables:
         return fields
     name = variables[0]
@@ -230,14 +235,14 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             found=found,
             remedy="write only numbers into all other cells of the row",
         )
-    if cell.factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
+    if cell.variable_factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(
             f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=found,
             remedy="for a mimic joint write mimic = {mimicked_joint, multiplier, offset}",
         )
-    return {"kind": kind, **fields, name: cell.constant, "sense": cell.factor}
+    return {"kind": kind, **fields, name: cell.constant, "sense": cell.variable_factor}
 
 
 def units_of_cell(cell: Cell, units: Units) -> Units:
@@ -395,9 +400,9 @@ def table_from_rows(
             found="[]",
             remedy="write a row for each moving joint",
         )
-    _check_order(rows)
+    _check_column_order(rows)
     parsed = tuple(parse_row(row, i, units) for i, row in enumerate(rows))
-    _check_leaders(parsed, coordinates)
+    _check_mimicked_joints(parsed, coordinates)
     return DHTable(
         convention_of(convention),
         parsed,
@@ -425,7 +430,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     return table_from_rows(data.get("rows"), data["convention"], **options)
 
 
-def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
+def _check_mimicked_joints(rows: Sequence[DHRow], coordinates: Any) -> None:
     if not isinstance(coordinates, Sequence) or isinstance(coordinates, str):
         raise InputError(
             "`coordinates` must be a list of names", where="coordinates", found=repr(coordinates)

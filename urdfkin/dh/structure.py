@@ -123,7 +123,7 @@ def find_structure(screws: ProductOfExponentials) -> Structure:
     pairs = tuple(_make_pair(screws, i) for i in range(len(letters) - 1))
     kinds = [*_find_triples(screws, letters, pairs), *_find_arm_kinds(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
-    tips, jacobian = _sample_tips(screws)
+    tips, jacobian = _sample_tips_and_jacobian(screws)
     origin, reach_point = _find_origin(screws)
     return Structure(
         screws.robot,
@@ -279,7 +279,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     return total + float(np.linalg.norm(screws.M[:3, 3] - point))
 
 
-def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
+def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Sample tip positions without mimic rules.
 
     Returns:
@@ -354,7 +354,7 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
     q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), OPW_SAMPLES)
     expected, best, reason = free.placement(q), None, ""
-    for reference in _candidate_tables(path):
+    for reference in _opw_candidate_tables(path):
         try:
             options = DerivationOptions(flip=find_reversed_joints(path, DerivationOptions(), reference))
         except InputError as error:
@@ -380,7 +380,7 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
     return best[1]
 
 
-def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
+def _opw_candidate_tables(path: FrameChain) -> Iterator[DHTable]:
     """Yield an OPW table for each choice of the signs of a1, a2 and b.
 
     The lengths are approximate.
@@ -400,7 +400,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read_parameters(table: DHTable) -> OpwParameters:
-    """`table` comes from `derive_matching_table` with a reference from `_candidate_tables`."""
+    """`table` comes from `derive_matching_table` with a reference from `_opw_candidate_tables`."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -409,7 +409,7 @@ def _read_parameters(table: DHTable) -> OpwParameters:
     return OpwParameters(names, lengths, tuple(offsets), signs, table.base, table.tool)
 
 
-def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
+def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the axes h_i and the vectors P_i.
 
     All joints must be revolute.
@@ -419,11 +419,11 @@ def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatAr
     Returns:
         (n, 3) unit axes, and (n + 1, 3) vectors, m.
     """
-    points = np.vstack([np.zeros(3), _shared_points(screws), screws.M[:3, 3]])
+    points = np.vstack([np.zeros(3), _choose_axis_points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
 
 
-def _shared_points(screws: ProductOfExponentials) -> FloatArray:
+def _choose_axis_points(screws: ProductOfExponentials) -> FloatArray:
     """Return a point of each axis; intersecting axes have the same point.
 
     Three axes have priority over two, and later intersections over earlier ones.

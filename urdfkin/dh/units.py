@@ -143,7 +143,7 @@ def _parse_number(value: object) -> float:
     if not isinstance(value, str):
         raise TypeError(value)
     cell = parse_cell(value)
-    if cell.factor is not None or cell.unit not in (None, "rad"):
+    if cell.variable_factor is not None or cell.unit not in (None, "rad"):
         raise ValueError(value)
     return cell.number
 
@@ -173,7 +173,7 @@ _PLAIN_TEXT = str.maketrans(
         "ℓ": "l",
     }
 )
-_LATEX = (
+_LATEX_TO_PLAIN = (
     (r"\\[dt]?frac\{([^{}]*)\}\{([^{}]*)\}", r"\1/\2"),
     (r"\^\{?\\circ\}?|\\degree|\\textdegree|\\circ", " deg "),
     (r"\\(?:mathrm|text|mathit|rm|mathbf|operatorname|textbf|textit|texttt|emph)\s*\{([^{}]*)\}", r"\1"),
@@ -203,14 +203,14 @@ class Cell:
     Attributes:
         number: The constant, in `unit`.
         unit: "rad" (also with pi), "deg", "m" or "mm"; None: the table's unit.
-        factor: Factor of the variable; None without variable.
+        variable_factor: Factor of the variable; None without variable.
         variable: Number in the variable's name, 2 for q2.
         text: Text of the constant, such as "90", if the constant is a single number; otherwise "".
     """
 
     number: float
     unit: str | None = None
-    factor: float | None = None
+    variable_factor: float | None = None
     variable: int | None = None
     text: str = ""
 
@@ -225,7 +225,7 @@ def to_plain_text(text: str) -> str:
     >>> to_plain_text("−π/2"), to_plain_text(r"$\frac{\pi}{2} + \theta_{1}$").split(), to_plain_text("θ₁*")
     ('- pi /2', ['pi/2', '+', 'theta_{1}'], 'theta1*')
     """
-    for pattern, plain in _LATEX:
+    for pattern, plain in _LATEX_TO_PLAIN:
         text = re.sub(pattern, plain, text)
     return text.translate(_PLAIN_TEXT).strip()
 
@@ -234,7 +234,7 @@ def parse_cell(original: str) -> Cell:
     """Parse the text of a cell.
 
     >>> parse_cell("-q2 + 90°")
-    Cell(number=90.0, unit='deg', factor=-1.0, variable=2, text='90')
+    Cell(number=90.0, unit='deg', variable_factor=-1.0, variable=2, text='90')
     """
     if len(original) > _MAX_CELL_LENGTH:
         raise InvalidCellError(f"a cell of {len(original)} characters")
@@ -257,7 +257,7 @@ def parse_cell(original: str) -> Cell:
     return Cell(
         number,
         unit=min(units, default=None),
-        factor=variables[0].value if variables else None,
+        variable_factor=variables[0].value if variables else None,
         variable=int(digits) if digits else None,
         text=numbers[0].text if len(numbers) == 1 else "",
     )

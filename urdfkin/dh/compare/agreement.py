@@ -13,10 +13,10 @@ from urdfkin.dh.compare.fit import (
     CELLS,
     TableArrays,
     TargetPoses,
-    find_hidden_cells,
+    find_compensated_cells,
     fit_cells,
     fit_model,
-    tip_derivatives,
+    tip_poses_and_derivatives,
 )
 from urdfkin.dh.compare.mistakes import MistakeSearch
 from urdfkin.dh.compare.result import (
@@ -44,14 +44,14 @@ _FIT_SEED, _CHECK_SEED = 1, 2
 #: A comparison reports the differing cells only if a correction of these cells reduces the tip error.
 #: The remaining tip error must be at most this fraction of the tip error without the correction.
 #: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
-_CORRECTED_FRACTION = 0.5
+_MAX_CELLS_ERROR_FRACTION = 0.5
 #: If a table does not agree with the URDF, urdfkin searches for a mistake in the table.
 #: Accepted after the correction: tip error <= max(tolerance, this number * tip error before)
-_CORRECTED_MISTAKE_FRACTION = 0.05
+_MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: The cells that differ without a fit are reported only if their number is at most
 #: this number + the number of cells that are reported after a fit.
-_MAX_MORE_CELLS = 2
+_MAX_MORE_UNFITTED_CELLS = 2
 #: The reach is computed from the positions of the tip.
 #: If the tip moves at most this fraction of the path length, the path length replaces the reach.
 _FIXED_TIP_SPREAD = 1e-6
@@ -86,19 +86,19 @@ def compare(
     table = _make_fitted_table(chain, standard, fitted)
     metres_bound, radians_bound = max_tip_error_bound(chain, table)
     comparison = TableComparison(
-        reference=table,
+        fitted_table=table,
         reach=targets.scale,
-        travel=sum(max(map(abs, ends)) for ends in _travels(chain).values()),
+        travel=sum(max(map(abs, ends)) for ends in _prismatic_ranges(chain).values()),
         is_fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
         offsets=_joint_offsets(standard, fitted),
         base=_find_absorbed_offset(written.base, fitted.base),
         tool=_find_absorbed_offset(written.tool, fitted.tool),
         differences=cells
-        if residual <= max(_CORRECTED_FRACTION * metres, NEGLIGIBLE_ERROR * targets.scale)
+        if residual <= max(_MAX_CELLS_ERROR_FRACTION * metres, NEGLIGIBLE_ERROR * targets.scale)
         else (),
         unfitted_differences=(),
-        hidden=_find_hidden_cells(reference, fitted, check_targets) if fit else (),
+        not_compared=_find_compensated_cells(reference, fitted, check_targets) if fit else (),
         mistakes=(),
         residual=residual,
         tolerance=tolerance,
@@ -112,7 +112,7 @@ def compare(
     )
     if comparison.is_exact_unfitted:
         return comparison
-    target_error = tolerance if comparison.agrees else max(tolerance, _CORRECTED_MISTAKE_FRACTION * metres)
+    target_error = tolerance if comparison.agrees else max(tolerance, _MAX_MISTAKE_ERROR_FRACTION * metres)
     search = MistakeSearch(chain, targets, check_targets, target_error)
     if mistakes := search.find(reference, fit=fit, agrees=comparison.agrees):
         cells = tuple(mistake.cell for mistake in mistakes if mistake.cell is not None)
@@ -120,7 +120,7 @@ def compare(
     if not fit:
         return comparison
     cells = _find_differences_without_fit(chain, reference, written, targets, check_targets, half_digits)
-    few = len(cells) <= len(comparison.differences) + _MAX_MORE_CELLS
+    few = len(cells) <= len(comparison.differences) + _MAX_MORE_UNFITTED_CELLS
     return replace(comparison, unfitted_differences=cells if few else ())
 
 
@@ -176,14 +176,14 @@ def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray,
 
     Mimic joints move independently.
     """
-    travels = _travels(chain)
+    travels = _prismatic_ranges(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = sample_uniform(ranges, count, seed)
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
 
 
-def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
+def _prismatic_ranges(chain: FrameChain) -> dict[str, tuple[float, float]]:
     """Return prismatic joints' ranges, m."""
     return {
         joint.name: joint_value_range(joint.kind, joint.limit if has_range(joint.limit) else None)
@@ -226,7 +226,7 @@ def _cell_mask(reference: DHTable) -> FloatArray:
     )
 
 
-def _find_hidden_cells(
+def _find_compensated_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
     """Find the cells whose errors a fit hides.
@@ -234,16 +234,16 @@ def _find_hidden_cells(
     Returns:
         Row index and name.
     """
-    hidden = []
-    for i, k in find_hidden_cells(fitted, check_targets):
+    compensated = []
+    for i, k in find_compensated_cells(fitted, check_targets):
         reference_index = _reference_row_index(reference, i, CELLS[k])
         if (
             reference_index is not None
             and k != fitted.variable_indices[i]
             and (CELLS[k] != "beta" or fitted.cells[i, k])
         ):
-            hidden.append((reference_index, CELLS[k]))
-    return tuple(sorted(hidden))
+            compensated.append((reference_index, CELLS[k]))
+    return tuple(sorted(compensated))
 
 
 def _find_differences(
@@ -256,8 +256,8 @@ def _find_differences(
     free: bool,
 ) -> tuple[CellDifference, ...]:
     """Return differing cells, largest effect first."""
-    by_cells, scale = tip_derivatives(fitted, check_targets)[2], check_targets.scale
-    linear = by_cells.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
+    cell_derivatives, scale = tip_poses_and_derivatives(fitted, check_targets)[2], check_targets.scale
+    linear = cell_derivatives.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
     largest = np.linalg.norm(linear, axis=1).max(axis=0)
     differences = []
     for i, row in enumerate(fitted.cells):
@@ -315,7 +315,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     displacements within the limits. For a prismatic joint without a range (`has_range`), the limits are
     -`ASSUMED_LIMIT` and `ASSUMED_LIMIT`.
     """
-    mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
+    mechanisms = Mechanism(_make_tree_without_mimic(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
     variable_indices = variables_of(pair, tolerance_of(*mechanisms))
     tip = link_names(table)[-1]
@@ -323,12 +323,12 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     return upper_bounds(pair, variable_indices, frame, FINE_GRID)
 
 
-def _make_free_tree(path: FrameChain, table: DHTable) -> KinematicTree:
+def _make_tree_without_mimic(path: FrameChain, table: DHTable) -> KinematicTree:
     """Convert a path to a tree without mimic rules.
 
     Links have the table's names.
     """
-    travels, z = _travels(path), np.array([0.0, 0.0, 1.0])
+    travels, z = _prismatic_ranges(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:
         kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC

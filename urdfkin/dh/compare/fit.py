@@ -32,15 +32,15 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, pose
 
-_MOTIONS = {
+_CELL_MOTIONS = {
     "theta": ElementaryMotion(2, True),
     "d": ElementaryMotion(2, False),
     "a": ElementaryMotion(0, False),
     "alpha": ElementaryMotion(0, True),
     "beta": ElementaryMotion(1, True),
 }
-CELLS = tuple(_MOTIONS)
-_IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
+CELLS = tuple(_CELL_MOTIONS)
+_IS_ANGLE = np.array([motion.turns for motion in _CELL_MOTIONS.values()])
 #: Maximum change of a free parameter in one step of the fit (rad, or a fraction of the reach).
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
@@ -53,7 +53,7 @@ _REWEIGHTINGS = 25
 _MIN_WEIGHT = 1e-9
 #: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
 #: Two cells with the same effect have different weights, so that only one of these cells changes.
-_LAST_WEIGHT = 1.2
+_LAST_CELL_WEIGHT = 1.2
 #: The first number is the initial weight of every cell in the column beta.
 #: At each reweighting, the weights of the column beta are multiplied by the second number.
 #: Both numbers are below 1. Therefore, the fit changes alpha first, and beta only if necessary.
@@ -61,11 +61,11 @@ _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
 #: The fit tries large changes of joint offsets only if: root mean square error > this number * reach
-_ROUNDING = 1e-13
+_EXACT_FIT_ERROR = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
-_TIP_ROUNDING = 1e-12
+_EXACT_TIP_ERROR = 1e-12
 #: Other joint signs are accepted if: tip error < this number * smallest tip error of earlier joint signs
-_OTHER_START_ERROR = 0.5
+_OTHER_SIGNS_ERROR_RATIO = 0.5
 #: Large changes (rad) of two consecutive joint offsets: theta_i += angle, theta_{i+1} -= angle
 #: If alpha is nearer to pi than to 0, theta_{i+1} += angle.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
@@ -100,7 +100,7 @@ class TableArrays:
         )
 
     @cached_property
-    def T_0_first(self) -> FloatArray:
+    def T_0_first_revolute(self) -> FloatArray:
         """Pose of the first revolute joint's frame in frame 0.
 
         All joints are at zero.
@@ -110,7 +110,7 @@ class TableArrays:
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
     @cached_property
-    def T_last_tip(self) -> FloatArray:
+    def T_last_revolute_tip(self) -> FloatArray:
         """Pose of the tip in the last revolute joint's frame.
 
         The later joints are at zero.
@@ -126,7 +126,7 @@ class TableArrays:
 
     @property
     def _motions(self) -> tuple[ElementaryMotion, ...]:
-        return tuple(_MOTIONS.values()) * len(self.cells)
+        return tuple(_CELL_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path and the amount (rad or m) of each elementary motion, (s, 5 n).
@@ -162,7 +162,7 @@ class TargetPoses:
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
-    def errors(self, poses: FloatArray) -> FloatArray:
+    def error_twists(self, poses: FloatArray) -> FloatArray:
         """Return the twists from poses to their targets.
 
         The shape is (6 s,). Angles are multiplied by `scale`.
@@ -171,7 +171,7 @@ class TargetPoses:
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
 
-def tip_derivatives(
+def tip_poses_and_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the tip's poses and their derivatives.
@@ -192,13 +192,13 @@ def tip_derivatives(
     twists[:, 3:] *= scale
     cells = twists.reshape(-1, len(CELLS) * n)
     variable_indices = [len(CELLS) * i + k for i, k in enumerate(model.variable_indices)]
-    first_frames = np.broadcast_to(model.base @ model.T_0_first, poses.shape)
-    last_frames = poses @ np.linalg.inv(model.T_last_tip)
-    ends = [_frame_twists(poses, frame, scale) for frame in (first_frames, last_frames)]
+    first_frames = np.broadcast_to(model.base @ model.T_0_first_revolute, poses.shape)
+    last_frames = poses @ np.linalg.inv(model.T_last_revolute_tip)
+    ends = [_tip_twists_of_frame_motions(poses, frame, scale) for frame in (first_frames, last_frames)]
     return poses, np.hstack([*ends, cells[:, variable_indices]]), cells
 
 
-def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
+def _tip_twists_of_frame_motions(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
     """Return the tip's twists (6 s, 6) for unit motions of a frame, at s samples.
 
     Columns: translations along the frame's axes, rotations about the frame's axes.
@@ -226,8 +226,14 @@ def apply_changes(
     # The twist that changes the base is expressed in the frame of the first revolute joint.
     # The twist that changes the tool is expressed in the frame of the last revolute joint.
     # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
-    base = _apply_twist(model.base @ model.T_0_first, free[:6], scale) @ np.linalg.inv(model.T_0_first)
-    tool = np.linalg.inv(model.T_last_tip) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.T_last_tip
+    base = _apply_twist(model.base @ model.T_0_first_revolute, free[:6], scale) @ np.linalg.inv(
+        model.T_0_first_revolute
+    )
+    tool = (
+        np.linalg.inv(model.T_last_revolute_tip)
+        @ _apply_twist(np.eye(4), free[6:12], scale)
+        @ model.T_last_revolute_tip
+    )
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
@@ -246,18 +252,18 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
     """
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
-        poses, by_free, by_cells = tip_derivatives(model, targets)
-        error = targets.errors(poses)
+        poses, free_derivatives, cell_derivatives = tip_poses_and_derivatives(model, targets)
+        error = targets.error_twists(poses)
         size = float(np.linalg.norm(error))
         if size < best_size * (1.0 - _MIN_DECREASE):
             best, best_size = model, size
         elif size > 2.0 * best_size or size <= _CONVERGED_ERROR * scale * len(error):
             break
-        by_cells = by_cells * mask.ravel()
-        by_free = by_free if free else np.zeros_like(by_free)
-        cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
+        cell_derivatives = cell_derivatives * mask.ravel()
+        free_derivatives = free_derivatives if free else np.zeros_like(free_derivatives)
+        cells = _sparse_changes(model, start, free_derivatives, cell_derivatives, error, scale)
         # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
-        offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
+        offsets = np.linalg.lstsq(free_derivatives, error - cell_derivatives @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
     return best
@@ -266,8 +272,8 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
 def _sparse_changes(
     model: TableArrays,
     start: TableArrays,
-    by_free: FloatArray,
-    by_cells: FloatArray,
+    free_derivatives: FloatArray,
+    cell_derivatives: FloatArray,
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
@@ -276,12 +282,12 @@ def _sparse_changes(
     As few cells as possible then differ from `start`. A cell is not changed if changes of the free
     parameters have the same effect on the tip.
     """
-    Q = _orthonormal_basis(by_free)
-    remaining = by_cells - Q @ (Q.T @ by_cells)
+    Q = _orthonormal_basis(free_derivatives)
+    remaining = cell_derivatives - Q @ (Q.T @ cell_derivatives)
     earlier = ((model.cells - start.cells) * np.where(_IS_ANGLE, scale, 1.0)).ravel()
     target = error - Q @ (Q.T @ error) + remaining @ earlier
-    changes = np.zeros(by_cells.shape[1])
-    weights = np.linspace(1.0, _LAST_WEIGHT, by_cells.shape[1])
+    changes = np.zeros(cell_derivatives.shape[1])
+    weights = np.linspace(1.0, _LAST_CELL_WEIGHT, cell_derivatives.shape[1])
     betas = slice(CELLS.index("beta"), None, len(CELLS))
     weights[betas] = _BETA_WEIGHT
     orthonormal, triangular = np.linalg.qr(remaining)
@@ -293,21 +299,23 @@ def _sparse_changes(
     return np.asarray(changes - earlier, np.float64)
 
 
-def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
-    return np.linalg.qr(by_free)[0] if by_free.any() else np.zeros((len(by_free), 0))
+def _orthonormal_basis(columns: FloatArray) -> FloatArray:
+    return np.linalg.qr(columns)[0] if columns.any() else np.zeros((len(columns), 0))
 
 
-def find_hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
+def find_compensated_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
     """Find cells equivalent to free parameters.
 
     Returns:
         Row and cell index.
     """
-    _, by_free, by_cells = tip_derivatives(model, targets)
-    Q = _orthonormal_basis(by_free)
-    remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)
-    hidden = np.flatnonzero(remaining <= _SAME_EFFECT_TOLERANCE * np.linalg.norm(by_cells, axis=0))
-    return [divmod(int(index), len(CELLS)) for index in hidden]
+    _, free_derivatives, cell_derivatives = tip_poses_and_derivatives(model, targets)
+    Q = _orthonormal_basis(free_derivatives)
+    remaining = np.linalg.norm(cell_derivatives - Q @ (Q.T @ cell_derivatives), axis=0)
+    compensated = np.flatnonzero(
+        remaining <= _SAME_EFFECT_TOLERANCE * np.linalg.norm(cell_derivatives, axis=0)
+    )
+    return [divmod(int(index), len(CELLS)) for index in compensated]
 
 
 # -- free parameters -----------------------------------------------------------------------------------
@@ -327,21 +335,21 @@ def fit_model(
     """
     written = TableArrays.of(standard)
 
-    def size(model: TableArrays) -> float:
+    def largest_error(model: TableArrays) -> float:
         metres, radians = targets.largest_errors(model)
         return metres + targets.scale * radians
 
-    best, best_size = written, size(written)
-    if best_size <= EPS * fitted_table_roundings(0) * targets.scale:
+    best, best_error = written, largest_error(written)
+    if best_error <= EPS * fitted_table_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, *(FAST_SEARCH if fast else ()))):
-        # A fit minimizes squared errors, but `size` is the largest error.
-        # Therefore, a fit can increase `size`.
-        model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=size)
-        model_size = size(model)
-        if model_size < (1.0 if i == 0 else _OTHER_START_ERROR) * best_size:
-            best, best_size = model, model_size
-        if best_size <= max(target_error, _TIP_ROUNDING * targets.scale):
+        # A fit minimizes the sum of squared errors.
+        # Therefore, a fit can increase the largest error.
+        model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=largest_error)
+        model_error = largest_error(model)
+        if model_error < (1.0 if i == 0 else _OTHER_SIGNS_ERROR_RATIO) * best_error:
+            best, best_error = model, model_error
+        if best_error <= max(target_error, _EXACT_TIP_ERROR * targets.scale):
             break
     return move_end_offsets_to_base_and_tool(best, written)
 
@@ -382,34 +390,34 @@ def fit_free_parameters(
     """
     for _ in range(2 * len(model.cells)):
         model, size = _least_squares_fit(model, targets, only_ends)
-        if not large_angles or size <= _ROUNDING * targets.scale * math.sqrt(6 * len(targets.values)):
+        if not large_angles or size <= _EXACT_FIT_ERROR * targets.scale * math.sqrt(6 * len(targets.values)):
             break
-        changed = min(_add_large_angles(model), key=lambda one: _size(one, targets), default=model)
-        if _size(changed, targets) >= size:
+        changed = min(_add_large_angles(model), key=lambda one: _error_norm(one, targets), default=model)
+        if _error_norm(changed, targets) >= size:
             break
         model = changed
     return model
 
 
-def _size(model: TableArrays, targets: TargetPoses) -> float:
-    return float(np.linalg.norm(targets.errors(model.poses(targets.values))))
+def _error_norm(model: TableArrays, targets: TargetPoses) -> float:
+    return float(np.linalg.norm(targets.error_twists(model.poses(targets.values))))
 
 
 def _least_squares_fit(
     model: TableArrays, targets: TargetPoses, only_ends: bool
 ) -> tuple[TableArrays, float]:
-    def residuals(model: TableArrays) -> tuple[FloatArray, FloatArray]:
+    def errors_and_frames(model: TableArrays) -> tuple[FloatArray, FloatArray]:
         path, amounts = model.path_and_amounts(targets.values)
         frames = path.frames(amounts)
-        return targets.errors(frames[..., -1, :, :]), frames
+        return targets.error_twists(frames[..., -1, :, :]), frames
 
-    def derivatives(model: TableArrays, frames: FloatArray) -> FloatArray:
-        return tip_derivatives(model, targets, frames)[1][:, : 12 if only_ends else None]
+    def free_derivatives(model: TableArrays, frames: FloatArray) -> FloatArray:
+        return tip_poses_and_derivatives(model, targets, frames)[1][:, : 12 if only_ends else None]
 
     return least_squares(
         model,
-        residuals,
-        derivatives,
+        errors_and_frames,
+        free_derivatives,
         lambda model, free: apply_changes(model, free, targets.scale),
         max_step=_MAX_STEP * targets.scale,
         patience=_PATIENCE,

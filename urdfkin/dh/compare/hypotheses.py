@@ -34,10 +34,10 @@ _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
 #: Cost (metres) of each difference from the interpretation that the file states:
-#: cost = _DIFFERENCE_COST * min(D) + tolerance
+#: cost = _DIFFERENCE_COST_RATIO * min(D) + tolerance
 #: D: sum of |shape of the table - shape of the URDF|
 #: The minimum is over all interpretations.
-_DIFFERENCE_COST = 0.1
+_DIFFERENCE_COST_RATIO = 0.1
 #: A tip error within the tolerance is accepted, and ends the search for a better interpretation.
 #: Above the tolerance, the tip error must be at most this fraction of the reach,
 #: and at most this fraction of the tip error of the interpretation that the file states.
@@ -107,7 +107,7 @@ def find_better_interpretation(
         candidates.append((difference, interpretation.difference_count(stated), interpretation, table))
     if not candidates:
         return None
-    cost = _DIFFERENCE_COST * min(difference for difference, *_ in candidates) + tolerance
+    cost = _DIFFERENCE_COST_RATIO * min(difference for difference, *_ in candidates) + tolerance
     candidates.sort(key=lambda candidate: candidate[0] + cost * candidate[1])
     better = list[tuple[float, BetterInterpretation]]()
     for _, count, interpretation, table in candidates[:_MAX_FITS]:
@@ -141,7 +141,7 @@ def find_dh_convention(
             errors.append(error)
     tests: tuple[Callable[[TableComparison], object], ...] = (
         lambda comparison: comparison.agrees and comparison.unfitted_metres <= tolerance,
-        lambda comparison: comparison.passes,
+        lambda comparison: comparison.agrees_without_mistakes,
         lambda comparison: comparison.agrees,
         lambda comparison: comparison.mistakes,
     )

@@ -31,9 +31,9 @@ from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
-_ANGLE_TOLERANCE = 1e-9
+_SAME_VALUE_TOLERANCE = 1e-9
 #: If a table has more possible corrections than this number, joint offsets and joint signs are not fitted.
-_MAX_FITS = 100
+_MAX_FITTED_CORRECTIONS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +78,13 @@ class MistakeSearch:
         if self._without_fit(reference) is not None:
             return ()
         fits = [self._without_fit]
-        if fit and not (agrees and self._needs_one_parameter(reference)):
+        if fit and not (agrees and self._agrees_after_one_fit_change(reference)):
             fits.append(self._fit_one_end)
         if fit and not agrees:
             fits += [self._fit_both_ends, self._fit_zeros_and_senses]
         corrections = list(_corrections(reference))
         for fit_table in fits:
-            if fit_table == self._fit_zeros_and_senses and len(corrections) > _MAX_FITS:
+            if fit_table == self._fit_zeros_and_senses and len(corrections) > _MAX_FITTED_CORRECTIONS:
                 break
             mistakes = [
                 self._make_mistake(reference, correction, model)
@@ -96,7 +96,7 @@ class MistakeSearch:
                 return tuple(mistake for mistake in mistakes if mistake.fit_changes.count == least)
         return ()
 
-    def _needs_one_parameter(self, table: DHTable) -> bool:
+    def _agrees_after_one_fit_change(self, table: DHTable) -> bool:
         """Whether a table agrees after a fit of one parameter.
 
         The parameter is base, tool, a joint offset or a joint sign.
@@ -104,7 +104,7 @@ class MistakeSearch:
         if self._fit_one_end(table) is not None:
             return True
         model = self._fit_zeros_and_senses(table)
-        return model is not None and self._find_fit_changes(_make_model(table), model).count <= 1
+        return model is not None and self._find_changed_parameters(_make_model(table), model).count <= 1
 
     def _agrees(self, model: TableArrays) -> bool:
         metres, radians = self.check_targets.largest_errors(model)
@@ -144,9 +144,11 @@ class MistakeSearch:
         ]
         models = [move_end_offsets_to_base_and_tool(fit, written) for fit in fits]
         agreeing = [model for model in models if self._agrees(model)]
-        return min(agreeing, key=lambda model: self._find_fit_changes(written, model).count, default=None)
+        return min(
+            agreeing, key=lambda model: self._find_changed_parameters(written, model).count, default=None
+        )
 
-    def _find_fit_changes(self, written: TableArrays, model: TableArrays) -> FitChanges:
+    def _find_changed_parameters(self, written: TableArrays, model: TableArrays) -> FitChanges:
         metres, radians = self.check_targets.largest_errors(model)
         fine = fit_resolution(metres / self.check_targets.scale, radians)
         rows = np.arange(len(model.cells))
@@ -161,8 +163,10 @@ class MistakeSearch:
         reversed_ = int((model.senses != written.senses).sum())
         return FitChanges(base, tool, int((zeros > fine).sum()), reversed_)
 
-    def _make_mistake(self, reference: DHTable, correction: _TableCorrection, model: TableArrays) -> Mistake:
-        metres, radians = self.check_targets.largest_errors(model)
+    def _make_mistake(
+        self, reference: DHTable, correction: _TableCorrection, fitted_model: TableArrays
+    ) -> Mistake:
+        metres, radians = self.check_targets.largest_errors(fitted_model)
         tables, cell = (reference, correction.table), None
         if correction.cell is not None:
             row = correction.rows[0]
@@ -170,7 +174,7 @@ class MistakeSearch:
             before, after = (_make_model(table).poses(self.check_targets.values) for table in tables)
             tip = float(np.linalg.norm(before[:, :3, 3] - after[:, :3, 3], axis=-1).max())
             cell = CellDifference(row, self.chain.joints[row].name, correction.cell, old, new, tip)
-        fitted = self._find_fit_changes(_make_model(correction.table), model)
+        fitted = self._find_changed_parameters(_make_model(correction.table), fitted_model)
         return Mistake(correction.kind, correction.rows, cell, correction.table, fitted, metres, radians)
 
 
@@ -182,13 +186,13 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
     for i, row in enumerate(reference.rows):
         for cell in COLUMNS:
             value = getattr(row, cell)
-            if abs(math.sin(value) if cell in ("alpha", "theta") else value) > _ANGLE_TOLERANCE:
+            if abs(math.sin(value) if cell in ("alpha", "theta") else value) > _SAME_VALUE_TOLERANCE:
                 yield _TableCorrection(
                     MistakeKind.SIGN, (i,), cell, _replace_cell(reference, i, cell, -value)
                 )
         for right_angle in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + right_angle, 2.0 * math.pi)
-            is_opposite_sign = abs(angle_difference(value, -row.alpha)) <= _ANGLE_TOLERANCE
+            is_opposite_sign = abs(angle_difference(value, -row.alpha)) <= _SAME_VALUE_TOLERANCE
             if not is_opposite_sign:
                 table = _replace_cell(reference, i, "alpha", value)
                 yield _TableCorrection(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)

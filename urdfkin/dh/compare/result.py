@@ -30,7 +30,7 @@ NEGLIGIBLE_ERROR = 1e-9
 _MIN_TIP_ERROR = 1e-12
 #: Half a unit of a cell's last digit is multiplied by this factor.
 #: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
-_HALF_DIGIT_FACTOR = 1.0 + 1e-6
+_HALF_DIGIT_MARGIN = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class CellDifference:
 
     @property
     def is_rounding(self) -> bool:
-        return abs(self.difference) <= self.half_digit * _HALF_DIGIT_FACTOR
+        return abs(self.difference) <= self.half_digit * _HALF_DIGIT_MARGIN
 
     @property
     def is_length(self) -> bool:
@@ -133,7 +133,7 @@ class TableComparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: Fitted table, with the URDF's joint names and coordinates.
+        fitted_table: The fitted table, with the URDF's joint names and coordinates.
         travel: Sum of the prismatic joints' largest absolute values, m.
         senses: Signs of the joints.
             The table's variable is sign * q + offset.
@@ -145,11 +145,11 @@ class TableComparison:
         unfitted_differences: Cells that must change so that the unfitted table agrees.
             Empty if `is_fitted` is false, or if `mistakes` is not empty.
             Empty if a tip error remains, or if more than len(differences) + 2 cells must change.
-        hidden: Row index and name of each cell whose error a fit compensates.
+        not_compared: Row index and name of each cell whose error a fit compensates.
         residual: Tip error after cell corrections, m.
     """
 
-    reference: DHTable
+    fitted_table: DHTable
     reach: float
     travel: float
     is_fitted: bool
@@ -165,7 +165,7 @@ class TableComparison:
     unfitted_radians: float
     differences: tuple[CellDifference, ...]
     unfitted_differences: tuple[CellDifference, ...]
-    hidden: tuple[tuple[int, str], ...]
+    not_compared: tuple[tuple[int, str], ...]
     mistakes: tuple[Mistake, ...]
     residual: float
     tolerance: float
@@ -180,49 +180,52 @@ class TableComparison:
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
-    def passes(self) -> bool:
+    def agrees_without_mistakes(self) -> bool:
         return self.agrees and not self.mistakes
 
     @property
-    def rounding(self) -> float:
+    def rounding_error(self) -> float:
         """Largest tip error due to rounding.
 
         Unit: rad, or m per m of reach.
         """
-        return EPS * fitted_table_roundings(len(self.reference.rows))
+        return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
     @property
-    def rounding_metres(self) -> float:
+    def rounding_error_metres(self) -> float:
         """Largest rounding error of position, m."""
-        return self.rounding * (self.reach + self.travel)
+        return self.rounding_error * (self.reach + self.travel)
 
     @property
     def resolution(self) -> float:
         """Rounding step of fitted numbers.
 
-        The unit is that of `rounding`.
+        The unit is that of `rounding_error`.
         """
         return fit_resolution(self.metres / self.reach, self.radians)
 
     @property
-    def exact(self) -> bool:
+    def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
         The proof covers the joint values of `metres_bound`.
         """
-        return self.metres_bound <= self.rounding_metres and self.radians_bound <= self.rounding
+        return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 
     @property
-    def condition(self) -> str:
+    def range_condition(self) -> str:
         """Assumption about prismatic joints without limits."""
-        rows = self.reference.rows
+        rows = self.fitted_table.rows
         free = [row.joint for row in rows if not row.kind.turns and not has_range(row.limit)]
         return f"{', '.join(free)} within {ASSUMED_LIMIT:g} m of zero" if free else ""
 
     @property
     def is_exact_unfitted(self) -> bool:
         """Whether rounding explains the tip errors without a fit."""
-        return self.unfitted_metres <= self.rounding_metres and self.unfitted_radians <= self.rounding
+        return (
+            self.unfitted_metres <= self.rounding_error_metres
+            and self.unfitted_radians <= self.rounding_error
+        )
 
 
 def has_range(limit: Limit | None) -> bool:
@@ -266,7 +269,7 @@ def comparison_document(comparison: TableComparison, units: Units) -> TextDocume
 
 def _fit_parts(comparison: TableComparison, units: Units) -> Parts:
     parts: Parts = []
-    table, fine = comparison.reference, comparison.resolution
+    table, fine = comparison.fitted_table, comparison.resolution
     variables = [
         f"  {row.joint}: {format_sum('-q' if sense < 0 else 'q', _format_offset(offset, row, fine, units))}"
         for row, sense, offset in zip(table.rows, comparison.senses, comparison.offsets, strict=True)
@@ -282,12 +285,12 @@ def _fit_parts(comparison: TableComparison, units: Units) -> Parts:
 
 
 def _verdict_lines(comparison: TableComparison) -> list[str]:
-    table = comparison.reference
+    table = comparison.fitted_table
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
-    agrees = "agrees only" if comparison.mistakes else "agrees exactly" if comparison.exact else "agrees"
+    agrees = "agrees only" if comparison.mistakes else "agrees exactly" if comparison.is_exact else "agrees"
     verdict = agrees if comparison.agrees else "DIFFERS"
     error = _format_tip_error(comparison.metres, comparison.radians)
-    condition = f", with {comparison.condition}" if comparison.condition else ""
+    condition = f", with {comparison.range_condition}" if comparison.range_condition else ""
     values = f"for all joint values within limits{condition}"
     proof = f"{comparison.samples} samples; proven bound {values}: {_format_bound(comparison)}"
     if comparison.is_exact_unfitted:
@@ -301,7 +304,7 @@ def _verdict_lines(comparison: TableComparison) -> list[str]:
     changes = [
         f"{what} by {_format_errors(end.metres, end.radians)}"
         for what, end in zip(("the base", "the tool"), ends, strict=True)
-        if end.metres > comparison.rounding_metres or end.radians > comparison.rounding
+        if end.metres > comparison.rounding_error_metres or end.radians > comparison.rounding_error
     ]
     zeros = sum(abs(offset) > fine for offset in comparison.offsets)
     reversed_ = sum(sense < 0 for sense in comparison.senses)
@@ -339,7 +342,7 @@ def _format_tip_error(metres: float, radians: float) -> str:
 
 
 def _format_bound(comparison: TableComparison) -> str:
-    if comparison.exact:
+    if comparison.is_exact:
         return "only rounding errors"
     return (
         "none"
@@ -357,7 +360,7 @@ def _mistake_lines(comparison: TableComparison, units: Units) -> list[str]:
     lines = ["", f"{subject} the table right {remaining_fit}:"]
     for mistake in comparison.mistakes:
         error = _format_tip_error(mistake.metres, mistake.radians)
-        lines.append(f"  {_format_correction(mistake, comparison.reference, units)}; {error}")
+        lines.append(f"  {_format_correction(mistake, comparison.fitted_table, units)}; {error}")
     if comparison.agrees:
         lines.append(
             "Correct the table. If the fitted base, tool and zeros are intended, write them into the table."
@@ -398,12 +401,12 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
             )
     elif comparison.is_exact_unfitted:
         parts.append("Every cell agrees with the URDF.")
-    elif comparison.exact:
+    elif comparison.is_exact:
         parts.append(
             "After the fit of base, tool and joint offsets, every compared cell agrees with the URDF."
         )
-    if comparison.hidden and not comparison.is_exact_unfitted:
-        cells = ", ".join(f"{cell}{row + 1}" for row, cell in comparison.hidden)
+    if comparison.not_compared and not comparison.is_exact_unfitted:
+        cells = ", ".join(f"{cell}{row + 1}" for row, cell in comparison.not_compared)
         same = "a change of base, tool or joint offsets has the same effect"
         parts.append(f"These cells are not compared, because {same}: {cells}.")
     if {(one.row, one.cell) for one in comparison.unfitted_differences} - {

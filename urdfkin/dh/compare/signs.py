@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.common_normals import (
-    MAX_HAYATI_TILT,
+    MAX_HAYATI_TILT_SINE,
     NEARLY_PARALLEL,
     AxisTransform,
     find_axis_transform,
@@ -38,13 +38,13 @@ BEAM_WIDTH = 128
 #: If several alignments fit equally well, the alignment with the URDF's joint signs is therefore preferred.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
-_PRISMATIC_WEIGHT = 1e-3
+_NEAR_PRISMATIC_WEIGHT = 1e-3
 #: Axes closer than this distance (m) count as coinciding.
 #: The axis x can then have any direction.
 _COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
-_HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
+_HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +136,8 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
     A sign -1 turns a joint frame by pi about x.
     """
     A = chain.constants[k]
-    A = _HALF_TURN @ A if sense_before < 0 else A
-    return np.array(A @ _HALF_TURN if sense_after < 0 else A)
+    A = _HALF_TURN_ABOUT_X @ A if sense_before < 0 else A
+    return np.array(A @ _HALF_TURN_ABOUT_X if sense_after < 0 else A)
 
 
 def _extend(
@@ -155,23 +155,23 @@ def _extend(
         theta_error = angle_difference(theta, row.theta)
         cost = candidate.cost + _REVERSAL_COST * (sense < 0)
         cost += reach * (abs(angle_difference(step.alpha, row.alpha)) + abs(step.beta - row.beta))
-        cost += abs(step.a - row.a) * (1.0 if both_revolute else _PRISMATIC_WEIGHT)
+        cost += abs(step.a - row.a) * (1.0 if both_revolute else _NEAR_PRISMATIC_WEIGHT)
         if i > 0 and turns[i]:
-            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else _PRISMATIC_WEIGHT)
+            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else _NEAR_PRISMATIC_WEIGHT)
         elif i > 0:
             cost += reach * abs(theta_error)
         offset, base = theta_error if turns[i] else d - row.d, candidate.base
         if i == 0:  # The first row's offset becomes part of the base.
             base, offset = joint_transform(step.phi - row.theta, step.delta - row.d), 0.0
         senses, offsets = (*candidate.senses, sense), (*candidate.offsets, offset)
-        free_offset = _free_offset(candidate, step, i, turns[i])
+        free_offset = _find_free_offset(candidate, step, i, turns[i])
         extended.append(
             _PartialAlignment(cost, senses, offsets, step.phi_next, step.delta_next, base, free_offset)
         )
     return extended
 
 
-def _free_offset(
+def _find_free_offset(
     partial: _PartialAlignment, step: AxisTransform, i: int, turns: bool
 ) -> tuple[int, float] | None:
     if not step.phi_is_free:
@@ -204,7 +204,7 @@ def _possible_transforms(
 ) -> Iterator[AxisTransform]:
     steps = []
     sine = tilt_sine(A)
-    near = abs(math.sin(row.alpha)) < MAX_HAYATI_TILT and sine < MAX_HAYATI_TILT
+    near = abs(math.sin(row.alpha)) < MAX_HAYATI_TILT_SINE and sine < MAX_HAYATI_TILT_SINE
     if not near or row.beta == 0.0:
         steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:

@@ -12,14 +12,14 @@ from urdfkin.system.lazy_import import get_hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-_TEXT = "urdfkin.dh.export.text"
+_TEXT_MODULE = "urdfkin.dh.export.text"
 #: For each format NAME: the module that contains the function `write_NAME`, and a description.
 #: The module name is "" if the package `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
-    "terminal": (_TEXT, "aligned text"),
-    "markdown": (_TEXT, "a Markdown table"),
-    "html": (_TEXT, "HTML, for a page or a notebook"),
-    "latex": (_TEXT, "a LaTeX table (booktabs)"),
+    "terminal": (_TEXT_MODULE, "aligned text"),
+    "markdown": (_TEXT_MODULE, "a Markdown table"),
+    "html": (_TEXT_MODULE, "HTML, for a page or a notebook"),
+    "latex": (_TEXT_MODULE, "a LaTeX table (booktabs)"),
     "csv": ("urdfkin.dh.export.data", "comma-separated, read back by urdfkin"),
     "json": ("urdfkin.dh.export.data", "JSON, read back by urdfkin"),
     "toml": ("urdfkin.dh.export.data", "TOML, read back by urdfkin"),
@@ -46,4 +46,4 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
     if not module:
         return str(get_hook("code in a language")(get_hook("code of a chain")(table, verify=verify), format))
     write = getattr(importlib.import_module(module), "write_" + format.replace("-", "_"))
-    return cast("str", write(table, units or Units()) if module == _TEXT else write(table))
+    return cast("str", write(table, units or Units()) if module == _TEXT_MODULE else write(table))

@@ -117,7 +117,7 @@ def format_rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
     ]
 
 
-_SYMPY = '''from sympy import Matrix, Rational, cos, pi, sin
+_SYMPY_TEMPLATE = '''from sympy import Matrix, Rational, cos, pi, sin
 
 
 def rows(q):
@@ -159,7 +159,7 @@ def write_sympy(table: DHTable) -> str:
     return (
         "\n".join(docstring_lines(table))
         + "\n"
-        + _SYMPY.format(
+        + _SYMPY_TEMPLATE.format(
             columns=column_names(table),
             names=", ".join(f"q{i}" for i in range(1, n + 1)),
             rows="\n".join(f"        ({row})," for row in format_rows(table, number, times=" * ")),
@@ -172,7 +172,7 @@ def write_sympy(table: DHTable) -> str:
     )
 
 
-_FRAMES = """\
+_MATLAB_TEMPLATE_END = """\
     S = one; S(1:2, 1:2) = [cos(theta), -sin(theta); sin(theta), cos(theta)]; S(3, 4) = d;
     X = one; X(2:3, 2:3) = [cos(alpha), -sin(alpha); sin(alpha), cos(alpha)]; X(1, 4) = a;
     Y = one; Y([1, 3], [1, 3]) = [cos(beta), sin(beta); -sin(beta), cos(beta)];
@@ -183,7 +183,7 @@ end
 """
 
 
-class _Matlab(Fractions):
+class _MatlabFractions(Fractions):
     def format_ratio(self, x: Fraction) -> str:
         return f"sym({x.numerator})/{x.denominator}"
 
@@ -193,7 +193,7 @@ class _Matlab(Fractions):
 
 def write_matlab_symbolic(table: DHTable) -> str:
     """Return a MATLAB file with `ROBOT_symbolic`."""
-    number, n = _Matlab(), len(table.joint_names)
+    number, n = _MatlabFractions(), len(table.joint_names)
     lines = [f"function [T, q] = {make_identifier(table.robot)}_symbolic()"]
     lines += [f"% {line}" for line in header_lines(table)]
     names = " ".join(f"q{i}" for i in range(1, n + 1))
@@ -211,4 +211,4 @@ def write_matlab_symbolic(table: DHTable) -> str:
     lines += ["    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4);"]
     lines += [f"    beta = {'rows(i, 5)' if table.has_hayati_rows else '0'};"]
     product = "S * (X * Y)" if table.convention is DHConvention.STANDARD else "(X * Y) * S"
-    return "\n".join([*lines, _FRAMES.format(product=product)])
+    return "\n".join([*lines, _MATLAB_TEMPLATE_END.format(product=product)])

@@ -114,10 +114,10 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
     return Matrix([[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]])
 
 
-def format_bound(value: float) -> str:
+def format_error_bound(value: float) -> str:
     """Format a bound with three digits, rounded up.
 
-    >>> format_bound(7.5912e-06), format_bound(0.0)
+    >>> format_error_bound(7.5912e-06), format_error_bound(0.0)
     ('7.60e-06', '0')
     """
     if value == 0.0:
@@ -132,7 +132,7 @@ def snap_lines(table: DHTable) -> list[str]:
         return []
     if not snap.changes:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
-    metres, radians = format_bound(snap.metres), format_bound(snap.radians)
+    metres, radians = format_error_bound(snap.metres), format_error_bound(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
     condition = f"; this holds if {holds_if}" if (holds_if := travel_condition(table)) else ""
     lines = [
@@ -143,7 +143,7 @@ def snap_lines(table: DHTable) -> list[str]:
     for change in snap.changes:
         n = len(table.rows)
         row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
-        displacement = format_bound(change.tip_displacement)
+        displacement = format_error_bound(change.tip_displacement)
         effect = f"turned by {change.angle:.2e} rad, tip moves by at most {displacement} m"
         effect += " with prismatic joints at 0" if change.prismatic_joints else ""
         lines.append(f"  {row}: {change.what}, {effect}")
@@ -201,12 +201,17 @@ def write_latex(table: DHTable, units: Units) -> str:
     frame = [rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}", r"  \toprule"]
     frame += [f"  {' & '.join(heads)} \\\\", r"  \midrule", *(f"  {' & '.join(row)} \\\\" for row in rows)]
     frame += [r"  \bottomrule", r"\end{tabular}"]
-    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *scale_to_fit(frame)]
+    lines = [
+        r"\begin{table}",
+        r"  \centering",
+        f"  \\caption{{{_latex_caption(table)}}}",
+        *scale_to_fit(frame),
+    ]
     lines += [line for what, T in poses.items() for line in latex_pose(what, T)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
 
-def _caption(table: DHTable) -> str:
+def _latex_caption(table: DHTable) -> str:
     names = f"{latex_text(table.robot)}, {latex_text(table.base_frame)} to {latex_text(table.tip_frame)}"
     product = _LATEX_FORMULA[table.convention]
     if table.has_hayati_rows:
@@ -215,7 +220,7 @@ def _caption(table: DHTable) -> str:
     if table.snap is not None and table.snap.changes:
         caption += (
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {latex_math(format_bound(table.snap.metres))}\\,m"
+            f" which moves the tip by at most {latex_math(format_error_bound(table.snap.metres))}\\,m"
         )
         caption += f" if {holds_if}." if (holds_if := travel_condition(table)) else "."
     return caption
@@ -261,11 +266,12 @@ class PrintedPrecision:
     condition: str = ""
 
     def __str__(self) -> str:
-        proven = "" if self.bound is None else f"; the proven bound is {format_bound(self.bound)} m"
+        proven = "" if self.bound is None else f"; the proven bound is {format_error_bound(self.bound)} m"
         condition = f"; this holds if {self.condition}" if self.condition else ""
         return (
-            f"printed with {self.digits} digits, the table gives the tip within {format_bound(self.metres)} m"
-            f" of its exact position on {self.samples} samples{proven}{condition}"
+            f"printed with {self.digits} digits, the table gives the tip within"
+            f" {format_error_bound(self.metres)} m of its exact position on {self.samples} samples"
+            f"{proven}{condition}"
         )
 
 
@@ -305,7 +311,7 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
     return T if is_identity(T) else np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
 
 
-def _largest_coordinate(table: DHTable, row: DHRow) -> float:
+def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
     """Return the largest absolute value of the joint that the row's joint mimics.
 
     The value is 0 without a mimic rule, or with the multiplier 0.
@@ -333,7 +339,7 @@ def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, 
         lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
         if row.mimic is not None and printed_row.mimic is not None:
             multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
-            total += multiplier_error * _largest_coordinate(table, row) * max(lever, 1.0)
+            total += multiplier_error * _largest_mimicked_value(table, row) * max(lever, 1.0)
         errors = np.abs(np.subtract(row.cells, printed_row.cells))
         total += float(errors[[0, 2]].sum() + errors[[1, 3, 4]].sum() * lever)
     base_error = base - table.base

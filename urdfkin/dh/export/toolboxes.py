@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from urdfkin.dh.convert import frame_poses
+from urdfkin.dh.convert import relative_frame_poses
 from urdfkin.dh.export.code import (
     check_no_mimic,
     docstring_lines,
@@ -29,7 +29,7 @@ from urdfkin.dh.export.code import (
 )
 from urdfkin.dh.export.text import latex_math, latex_pose, scale_to_fit
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
-from urdfkin.dh.structure import axes_and_vectors
+from urdfkin.dh.structure import axes_and_connecting_vectors
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.errors.display import format_number
 from urdfkin.errors.escape import latex_text
@@ -64,7 +64,7 @@ def _link_code(row: DHRow, convention: DHConvention) -> str:
 def write_matlab_rst(table: DHTable) -> str:
     """Return a MATLAB function file that makes a rigidBodyTree."""
     check_no_mimic(table, "rigidBodyTree")
-    poses = frame_poses(table)
+    poses = relative_frame_poses(table)
     lines = [
         f"function robot = {make_identifier(table.robot)}_tree()",
         *(f"% {line}" for line in header_lines(table)),
@@ -171,7 +171,7 @@ def _numpy(screws: ProductOfExponentials) -> str:
     for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
         lines += _array(name, rows, ")" if name == "M" else ").reshape(-1, 6).T")
     if all(joint.kind.turns for joint in screws.joints):
-        H, P = axes_and_vectors(screws)
+        H, P = axes_and_connecting_vectors(screws)
         lines += [
             "",
             "# EAIK's HPRobot(H, P), ik-geo: p = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)).",
