@@ -25,7 +25,13 @@ def describe_result(path: Path) -> str:
         return "not verified"
     shapes, _, remark = certificate.source_notes.partition("Pinocchio's MJCF reader")
     suffix = ", without its shapes" if "only without shapes" in shapes else ""
-    phrases = "agrees on the bodies", "disagrees", "does not accept", "different joints", "does not find"
+    phrases = (
+        "agrees on the poses of the bodies",
+        "disagrees",
+        "does not accept",
+        "different joints",
+        "does not find",
+    )
     for phrase in phrases:
         if phrase in remark:
             return f"verified{suffix}; Pinocchio's MJCF reader: {phrase}"

@@ -566,8 +566,8 @@ MESH = '<geom type="mesh" mesh="nope"/></body></worldbody><asset><mesh name="nop
 @pytest.mark.parametrize(
     ("old", "new", "shapes", "expected"),
     [
-        ("</mujoco>", "</mujoco>", "", "agrees on the bodies"),
-        ("</body></worldbody>", MESH, ", without its shapes", "agrees on the bodies"),
+        ("</mujoco>", "</mujoco>", "", "agrees on the poses of the bodies"),
+        ("</body></worldbody>", MESH, ", without its shapes", "agrees on the poses of the bodies"),
         ("<site", UNNAMED.format(""), "", "does not find"),
         ("<site", UNNAMED.format("<joint/>"), "", "different joints"),
     ],
