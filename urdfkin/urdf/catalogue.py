@@ -98,7 +98,7 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 
-def example_robots() -> tuple[str, ...]:
+def example_robot_data_names() -> tuple[str, ...]:
     return tuple(name for name, entry in catalogue().items() if not entry.is_bundled)
 
 
