@@ -418,7 +418,7 @@ class CommentIndex:
 
 
 #: Maximum number of misspelt names in a file that get suggestions.
-MAX_SEARCHES = 20
+MAX_NAME_SEARCHES = 20
 #: Limits of one search for similar names:
 #: number of names, and number of compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
@@ -459,8 +459,8 @@ class Reporter:
     comments: list[Comment] = field(default_factory=list)
     silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
     comment_index: CommentIndex = field(default_factory=CommentIndex)
-    _searches: int = 0
-    _raw_blanks: bool | None = None
+    _name_search_count: int = 0
+    _replaced_characters: bool | None = None
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
     _element: Element | None = None
     _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
@@ -502,7 +502,7 @@ class Reporter:
         tag, name = None, None
         if element is not None:
             line, column, width = self._locate(element, attribute)
-            subject = element if misplaced else element.top_element
+            subject = element if misplaced else element.top_level_element
             tag, name = subject.tag, subject.attributes.get("name") if element.parent is not None else None
         finding = Finding(
             rule.id, severity, message, found, remedy, self.file, line, column, tag, name,
@@ -530,9 +530,9 @@ class Reporter:
                 group.pairs = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three similar names, or [] after `MAX_SEARCHES` calls."""
-        self._searches += 1
-        if self._searches > MAX_SEARCHES:
+        """Return up to three similar names, or [] after `MAX_NAME_SEARCHES` calls."""
+        self._name_search_count += 1
+        if self._name_search_count > MAX_NAME_SEARCHES:
             return []
         return find_similar_names(word, islice(known, MAX_CANDIDATES), work=MAX_COMPARED_PAIRS)
 
@@ -565,14 +565,14 @@ class Reporter:
         return tuple(sorted(findings, key=_sort_key))
 
     @property
-    def has_raw_blanks(self) -> bool:
+    def has_replaced_characters(self) -> bool:
         """Whether an attribute value contains a tab, a line end or a reference such as `&amp;`.
 
         XML parsers replace these characters.
         """
-        if self._raw_blanks is None:
-            self._raw_blanks = _RAW_BLANK.search(self.data) is not None
-        return self._raw_blanks
+        if self._replaced_characters is None:
+            self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
+        return self._replaced_characters
 
     def raw_value(self, element: Element, attribute: str) -> str | None:
         """Return an attribute value as written in the file."""
@@ -616,7 +616,7 @@ class Reporter:
                 return None
             end = closed.end()
         start = start_of_blanks(self.data, element.offset, b" \t")
-        rest = _REST_OF_LINE.match(self.data, end)
+        rest = _BLANKS_TO_LINE_END.match(self.data, end)
         alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
         return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(element.offset, end),))
 
@@ -635,10 +635,10 @@ class _AttributeSpan:
 #: A reference is, for example, `&amp;`.
 #: XML parsers replace tabs, line ends and references in attribute values.
 #: Possessive quantifiers keep the matching time linear.
-_RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
+_REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")
-_REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
+_BLANKS_TO_LINE_END = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
 def _attributes(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:

@@ -266,7 +266,7 @@ class _Builder:
             if not self.has_ignore_comment:
                 self.parser.CommentHandler = None
         else:
-            element.top_ancestor = None if parent is self.root else parent.top_element
+            element.top_level_ancestor = None if parent is self.root else parent.top_level_element
             parent.append(element)
         for comment in self.pending_comments:
             comment.element = element
@@ -419,7 +419,7 @@ _REASONS: dict[str, tuple[str, str | None]] = {
 
 BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)
 BAD_VECTOR = Rule("URDF302", "bad-vector", ERROR)
-WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
+WHITESPACE_IN_NUMBER = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
@@ -449,7 +449,7 @@ class NumberReader:
         value = self._read_number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
         if value is not None and written != written.rstrip():
             self._report_refused_by_urdfdom(element, attribute, "a space after the number")
-        elif value is not None and self.report.has_raw_blanks:
+        elif value is not None and self.report.has_replaced_characters:
             self._check_raw(element, attribute, 1)
         return value
 
@@ -477,7 +477,7 @@ class NumberReader:
                 self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
             )
             return None
-        if self.report.has_raw_blanks:
+        if self.report.has_replaced_characters:
             self._check_raw(element, attribute, count)
         return tuple(values)
 
@@ -489,7 +489,7 @@ class NumberReader:
                 remedy, found = "check the exponent", quote(piece)
                 self.report.add(UNDERFLOW, message, element, attribute=attribute, found=found, remedy=remedy)
             return value
-        what = attribute if element.tag in _ELEMENTS_NOT_NAMED else f"{attribute} of <{element.tag}>"
+        what = attribute if element.tag in _TAGS_OMITTED_IN_MESSAGES else f"{attribute} of <{element.tag}>"
         part = "" if piece == element.attributes[attribute] else "a part of "
         message, remedy = f"{part}{what} is not a number{self.effect}", _remedy(piece)
         if value is not None:
@@ -530,7 +530,7 @@ class NumberReader:
 
     def _report_refused_by_urdfdom(self, element: Element, attribute: str, what: str) -> None:
         value = element.attributes[attribute]
-        rule, message = WHITESPACE, f"{attribute} has {what}, which urdfdom refuses"
+        rule, message = WHITESPACE_IN_NUMBER, f"{attribute} has {what}, which urdfdom refuses"
         if self.bad_number is not BAD_NUMBER:  # Kinematics does not use this number.
             rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
@@ -546,7 +546,7 @@ class NumberReader:
 
 #: Messages about invalid numbers in these elements name the attribute, but not the tag.
 #: For other elements, the message also names the element.
-_ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
+_TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
@@ -622,7 +622,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-_FORMATS = {
+_REMEDY_BY_ROOT_TAG = {
     "sdf": "this is an SDF file; convert the file to a URDF first",
     "mujoco": "this is an MJCF file; `load` and the commands read MJCF files with the suffix .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
@@ -643,7 +643,7 @@ def _report_other_format(report: Reporter, root: Element) -> None:
     elif local.lower() == "robot":
         remedy = "write <robot> in lower case"
     else:
-        remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
+        remedy = _REMEDY_BY_ROOT_TAG.get(local.lower(), "a URDF begins with <robot name=...>")
     report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
 
 

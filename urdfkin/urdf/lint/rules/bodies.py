@@ -36,7 +36,7 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def check_inertials(report: Reporter, robot: RobotRecord) -> None:
-    numbers = NumberReader(report, UNREADABLE, UNREADABLE)
+    numbers = NumberReader(report, UNREADABLE_NUMBER, UNREADABLE_NUMBER)
     for link in robot.links.values():
         inertial = link.find("inertial")
         if inertial is not None:
@@ -130,7 +130,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
     return low * scale, (3.0 * mean - high - low) * scale, high * scale
 
 
-UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
+UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
 #: Numeric attributes of each shape:
@@ -145,7 +145,7 @@ _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
 
 
 def check_shapes(report: Reporter, robot: RobotRecord) -> None:
-    numbers = NumberReader(report, UNREADABLE, UNREADABLE)
+    numbers = NumberReader(report, UNREADABLE_NUMBER, UNREADABLE_NUMBER)
     for link in robot.links.values():
         for shape in link.children:
             if shape.tag in ("visual", "collision"):
@@ -186,7 +186,7 @@ def _check_geometry(
     if shape.tag == "mesh" and not shape.attributes.get("filename", "").strip():
         _report_missing(report, owner, shape, "filename")
     elif shape.tag == "mesh":
-        check_address(report, shape)
+        report_remote_mesh(report, shape)
 
 
 def _report_missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
@@ -263,16 +263,16 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
             if folder is None:
                 missing.setdefault(package, []).append(mesh)
             elif not _exists(folder / path):
-                _report_file(report, mesh, filename)
+                _report_missing_mesh(report, mesh, filename)
         elif _is_missing_file(filename, urdf_path):
-            _report_file(report, mesh, filename)
+            _report_missing_mesh(report, mesh, filename)
     for package, meshes in missing.items():
         remedy = "add the package's folder to ROS_PACKAGE_PATH" if package else "write package://NAME/PATH"
         report.add(
             MESH_MISSING,
-            f"package {quote(package)} of {_count(len(meshes))} is not found"
+            f"package {quote(package)} of {_mesh_count_text(len(meshes))} is not found"
             if package
-            else f"the address of {_count(len(meshes))} names no package",
+            else f"the address of {_mesh_count_text(len(meshes))} names no package",
             meshes[0],
             attribute="filename",
             found=quote(meshes[0].attributes["filename"]),
@@ -280,7 +280,7 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
         )
 
 
-def check_address(report: Reporter, mesh: Element) -> None:
+def report_remote_mesh(report: Reporter, mesh: Element) -> None:
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
         message = "the mesh is on the network and was not downloaded"
@@ -310,11 +310,11 @@ def _exists(path: Path) -> bool:
         return False
 
 
-def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
+def _report_missing_mesh(report: Reporter, mesh: Element, filename: str) -> None:
     message = "the mesh is not found"
     remedy = "correct the filename, or add the file; kinematics needs no mesh"
     report.add(MESH_MISSING, message, mesh, attribute="filename", found=quote(filename), remedy=remedy)
 
 
-def _count(number: int) -> str:
+def _mesh_count_text(number: int) -> str:
     return "a mesh" if number == 1 else f"{number} meshes"

@@ -30,13 +30,13 @@ from urdfkin.urdf.records import Element, RobotRecord
 INCLUDE = Rule("URDF112", "include", ERROR)
 XACRO = Rule("URDF202", "unexpanded-xacro", ERROR)
 NO_LINKS = Rule("URDF205", "no-links", ERROR)
-NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
+DEFAULT_NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 #: Elements of SRDF files, which supplement a URDF.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
-_COMMAND = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
+_SUBSTITUTION = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 
@@ -60,7 +60,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
     if "xmlns" in root.attributes:
         message = "xmlns puts the elements into a namespace; readers that support namespaces find no links"
         found = quote(root.attributes["xmlns"])
-        report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
+        report.add(DEFAULT_NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
     namespaces = {
         key.removeprefix("xmlns:"): value
         for element in root.walk()
@@ -79,7 +79,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
     # Only xacro elements directly inside <robot>, or anywhere inside <joint>, can change kinematics.
     if _report_xacro(
-        report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
+        report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_level_element.tag == "joint"
     ):
         return
     expressions: list[_Occurrence] = [
@@ -88,7 +88,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
         for key, value in element.attributes.items()
         if "$" in value and is_expression(value) and not key.startswith("xmlns")
     ]
-    _report_xacro(report, "xacro expression", expressions, _is_used)
+    _report_xacro(report, "xacro expression", expressions, _affects_kinematics)
 
 
 _EXPAND_REMEDY = (
@@ -123,8 +123,10 @@ def _report_xacro(
     return bool(used)
 
 
-def _is_used(element: Element) -> bool:
-    return element.top_element.tag == "joint" or (element.top_element is element and element.tag == "link")
+def _affects_kinematics(element: Element) -> bool:
+    return element.top_level_element.tag == "joint" or (
+        element.top_level_element is element and element.tag == "link"
+    )
 
 
 def _count_more(group: Sequence[object]) -> str:
@@ -133,7 +135,7 @@ def _count_more(group: Sequence[object]) -> str:
 
 def is_expression(value: str) -> bool:
     start = value.find("${")
-    return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
+    return (start >= 0 and "}" in value[start:]) or _SUBSTITUTION.search(value) is not None
 
 
 MISPLACED = Rule("URDF206", "misplaced-element", ERROR)
@@ -257,7 +259,7 @@ def walk_outside_extensions(element: Element) -> Iterator[Element]:
 
 def _is_link_or_joint(element: Element) -> bool:
     """Return whether an element is a link or joint, possibly with a misspelt tag."""
-    tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MAX_TAG_LENGTH else None
+    tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MISSPELT_LENGTH_BOUND else None
     if tag == "link":
         return "name" in element.attributes
     return tag == "joint" and (
@@ -268,7 +270,7 @@ def _is_link_or_joint(element: Element) -> bool:
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
 #: Tags of this length or longer are not a misspelt `link` or `joint`.
-_MAX_TAG_LENGTH = 8
+_MISSPELT_LENGTH_BOUND = 8
 
 
 def _check_attributes(report: Reporter, element: Element) -> None:
@@ -358,13 +360,13 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
         if own:
             stack.append((element, True))
         stack += [(child, False) for child in reversed(element.children)]
-        for prefix, attribute in _prefixes_of(element):
+        for prefix, attribute in _find_prefix_uses(element):
             if declared[prefix] < 1:
                 found.setdefault(prefix, []).append((element, attribute))
     return found
 
 
-def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
+def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
     """Yield the namespace prefixes in the attribute names and in the tag of an element.
 
     The second value of a pair is the name of the attribute with the prefix, or None for the prefix of the
@@ -380,7 +382,7 @@ def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
 RESERVED_NAME = Rule("URDF403", "reserved-name", WARNING)
 UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
 ODD_NAME = Rule("URDF405", "odd-name", WARNING)
-NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
+LINE_BREAK_IN_NAME = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
 #: Maximum number of characters of a name; URDF405 reports longer names.
@@ -394,7 +396,7 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
         _check_odd_name(report, name, element)
-        _check_blanks(report, element)
+        _check_line_breaks_in_name(report, element)
         _check_reserved(report, name, element, root_joint)
     for kind in (links, joints):
         _check_lookalikes(report, kind)
@@ -420,12 +422,14 @@ def _check_odd_name(report: Reporter, name: str, element: Element) -> None:
         report.add(ODD_NAME, reason, element, attribute="name", found=quote(name), remedy=remedy)
 
 
-def _check_blanks(report: Reporter, element: Element) -> None:
-    raw_value = report.raw_value(element, "name") if report.has_raw_blanks else None
+def _check_line_breaks_in_name(report: Reporter, element: Element) -> None:
+    raw_value = report.raw_value(element, "name") if report.has_replaced_characters else None
     if raw_value is not None and any(c in raw_value for c in "\t\r\n"):
         message = "the name contains a tab or a line end"
         remedy = "write the name on one line, without tabs"
-        report.add(NAME_BLANKS, message, element, attribute="name", found=quote(raw_value), remedy=remedy)
+        report.add(
+            LINE_BREAK_IN_NAME, message, element, attribute="name", found=quote(raw_value), remedy=remedy
+        )
 
 
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:

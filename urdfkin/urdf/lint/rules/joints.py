@@ -504,8 +504,8 @@ DEGREES = Rule("URDF602", "degrees", WARNING)
 MILLIMETRES = Rule("URDF603", "huge-length", WARNING)
 TINY_ROBOT = Rule("URDF604", "tiny-robot", WARNING)
 SAME_PLACE = Rule("URDF605", "same-place", NOTE)
-OVERFLOW = Rule("URDF606", "overflow", ERROR)
-NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
+LENGTH_OVERFLOW = Rule("URDF606", "overflow", ERROR)
+NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
@@ -541,7 +541,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> 
         _check_angles(report, joint, reach, condition)
         _check_lengths(report, joint)
         _check_neutral(report, joint)
-    _check_equal_axes(report, robot)
+    _check_equal_joints(report, robot)
     if is_tree:
         _check_total_length(report, robot, reach)
 
@@ -680,7 +680,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if lower <= upper and not lower <= 0.0 <= upper:
         report.add(
-            NEUTRAL,
+            NEUTRAL_OUTSIDE_LIMITS,
             "the limits exclude 0, the value of the joint in the neutral configuration",
             limit.element,
             attribute="lower" if lower > 0.0 else "upper",
@@ -690,7 +690,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
         )
 
 
-def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
+def _check_equal_joints(report: Reporter, robot: RobotRecord) -> None:
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL_TYPES:
@@ -723,7 +723,9 @@ def _check_total_length(report: Reporter, robot: RobotRecord, reach: dict[str, f
         element = far.origin_element or far.element
         message = "the sum of the lengths along the chain is too large for a double"
         found = quote(element.attributes.get("xyz", ""))
-        report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
+        report.add(
+            LENGTH_OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent"
+        )
     elif 0.0 < whole < SUSPICIOUS_ROBOT_SIZE:
         message = f"the joint origins along the longest chain of the robot add up to {_length_text(whole)}"
         report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")
