@@ -25,7 +25,7 @@ _FORBIDDEN_SYMBOLS = ("type", "vars")
 #: Test expression that xacro alone evaluates, and urdfkin refuses.
 _PROBE = "${(lambda: 1)()}"
 
-_TOO_MUCH = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH_MEMORY = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
@@ -38,7 +38,7 @@ def serve() -> None:
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], allowed_paths)
     except MemoryError:
-        answer = {"error": _TOO_MUCH}
+        answer = {"error": _TOO_MUCH_MEMORY}
     except (Exception, SystemExit) as error:
         answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
@@ -79,16 +79,16 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: Al
         try:
             return evaluate(expression, names, functions)
         except MemoryError:  # A MemoryError has no message.
-            raise RefusedError(_TOO_MUCH) from None
+            raise RefusedError(_TOO_MUCH_MEMORY) from None
 
-    def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:
+    def evaluate_substitution(expression: str, context: Mapping[str, Any]) -> str:
         names = {
             name: substitution_args.convert_value(x, "auto") for name, x in context.get("arg", {}).items()
         }
         return str(evaluate(expression, {**symbols, "true": True, "false": False, **names}, functions))
 
     xacro.safe_eval = value_of
-    substitution_args._eval = value_of_arguments  # This function evaluates `$(eval ...)`.
+    substitution_args._eval = evaluate_substitution  # This function evaluates `$(eval ...)`.
     xacrodoc.packages.get_path = _make_package_finder(path, search, allowed_paths)
     try:
         xacro.eval_text(_PROBE, symbols)
@@ -101,7 +101,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: Al
 def _make_package_finder(
     path: Path, search: Mapping[str, str], allowed_paths: AllowedPaths
 ) -> Callable[[str], str]:
-    def is_package(folder: Path) -> bool:
+    def is_allowed_or_package(folder: Path) -> bool:
         """Return whether a folder is allowed or contains a package.xml.
 
         For example, `$(find etc)` does not find /etc.
@@ -109,7 +109,7 @@ def _make_package_finder(
         return allowed_paths.allows(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:
-        folder = find_package(name, path, search, is_package)
+        folder = find_package(name, path, search, is_allowed_or_package)
         if folder is None:
             raise LookupError(f"package {name!r} is not found")
         if not allowed_paths.allows(str(folder)):

@@ -21,7 +21,7 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import SLIDE_LIMIT, make_fixed_joint, make_unique
+from urdfkin.urdf.mjcf import FALLBACK_PRISMATIC_LIMIT, make_fixed_joint, make_unique
 from urdfkin.urdf.parser import QUATERNION
 from urdfkin.urdf.reader import find_root_link, make_joint_rows
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
@@ -138,7 +138,7 @@ def _serialize(root: Any) -> str:
 #: R is a revolute joint, and P is a prismatic joint.
 #: RUB is a revolute joint without limits.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
-_KINDS = {
+_KIND_BY_CLASS = {
     "R": JointKind.REVOLUTE,
     "RUB": JointKind.CONTINUOUS,
     "P": JointKind.PRISMATIC,
@@ -264,7 +264,7 @@ class _ModelReader:
         joint, name = model.joints[j], str(model.names[j])
         class_name = str(joint.shortname())
         aligned = _ALIGNED_CLASS.fullmatch(class_name)
-        kind = _KINDS.get(aligned[1] if aligned else class_name)
+        kind = _KIND_BY_CLASS.get(aligned[1] if aligned else class_name)
         if kind is None:
             mimics = class_name.endswith("Mimic")
             raise InputError(
@@ -284,17 +284,20 @@ class _ModelReader:
         if not kind.has_axis:
             return Joint(name, kind, 0, T, axis)
         q, v = int(joint.idx_q), int(joint.idx_v)
-        speed, effort = (_finite(x[v]) for x in (model.upperVelocityLimit, model.upperEffortLimit))
+        speed, effort = (_convert_limit(x[v]) for x in (model.upperVelocityLimit, model.upperEffortLimit))
         lower, upper = -math.inf, math.inf
         if kind is not JointKind.CONTINUOUS:
-            lower, upper = _finite(model.lowerPositionLimit[q]), _finite(model.upperPositionLimit[q])
+            lower, upper = (
+                _convert_limit(model.lowerPositionLimit[q]),
+                _convert_limit(model.upperPositionLimit[q]),
+            )
         if math.isinf(lower) or math.isinf(upper):
             if kind.turns:
                 kind = JointKind.CONTINUOUS
             else:
-                lower, upper = max(lower, -SLIDE_LIMIT), min(upper, SLIDE_LIMIT)
+                lower, upper = max(lower, -FALLBACK_PRISMATIC_LIMIT), min(upper, FALLBACK_PRISMATIC_LIMIT)
         return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
 
 
-def _finite(value: float) -> float:
+def _convert_limit(value: float) -> float:
     return math.copysign(math.inf, value) if abs(value) > _INFINITE_LIMIT else float(value)

@@ -45,7 +45,7 @@ from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
 #: Limit (m) that replaces a missing limit of a prismatic joint.
 #: URDF requires limits.
-SLIDE_LIMIT = 1000.0
+FALLBACK_PRISMATIC_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
@@ -144,7 +144,7 @@ class Mjcf:
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
             own = np.full(len(q), float(np.linalg.norm(m.body_pos[i])))
-            for j, kind, to in self._joints_of(i):
+            for j, kind, to in self._body_joints(i):
                 if kind == "free":
                     own = np.linalg.norm(qpos[:, to : to + 3], axis=1)
                 elif kind == "slide":
@@ -163,12 +163,12 @@ class Mjcf:
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
             at_body[:, i] = at_body[:, m.body_parentid[i]]
-            for _, kind, to in self._joints_of(i):
+            for _, kind, to in self._body_joints(i):
                 if kind == "hinge" and m.qpos0[to]:
                     at_body[:, i] += qpos[:, to] + abs(m.qpos0[to])
         return self._frame_values(at_body, np.zeros(m.nsite))
 
-    def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
+    def _body_joints(self, body: int) -> Iterator[tuple[int, str, int]]:
         m, kinds = self.model, import_mujoco().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         for j in _joint_indices(m, body):
@@ -525,9 +525,12 @@ class _MjcfReader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        what = f"a slide joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
+        what = (
+            f"a slide joint without limits gets +-{FALLBACK_PRISMATIC_LIMIT:g} m,"
+            " because URDF requires limits"
+        )
         self.remarks.append(MjcfRemark(what, f"joint {name}"))
-        return JointKind.PRISMATIC, Limit(-SLIDE_LIMIT, SLIDE_LIMIT, np.inf, effort)
+        return JointKind.PRISMATIC, Limit(-FALLBACK_PRISMATIC_LIMIT, FALLBACK_PRISMATIC_LIMIT, np.inf, effort)
 
     def _read_rules(self) -> Iterator[tuple[str, Mimic]]:
         m, rules = self.model, dict[str, Mimic]()

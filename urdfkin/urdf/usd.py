@@ -48,7 +48,13 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import MAX_BYTES, read_start
 from urdfkin.system.lazy_import import install_command, installed_version
 from urdfkin.urdf.confinement import AllowedPaths
-from urdfkin.urdf.mjcf import SLIDE_LIMIT, depends_on, make_fixed_joint, make_unique, resolve_rule
+from urdfkin.urdf.mjcf import (
+    FALLBACK_PRISMATIC_LIMIT,
+    depends_on,
+    make_fixed_joint,
+    make_unique,
+    resolve_rule,
+)
 from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
@@ -66,7 +72,7 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 _MAX_SHEAR = 14.0
 #: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
 #: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
-_NEGLIGIBLE_DEGREES = 0.01
+_NEGLIGIBLE_LIMIT_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
@@ -84,7 +90,7 @@ _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xform prims that contain the shapes of a body.
-_SHAPE_GROUPS = ("visual", "visuals", "collision", "collisions")
+_SHAPE_XFORM_NAMES = ("visual", "visuals", "collision", "collisions")
 #: Rotation of the y axis onto the z axis.
 _ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
@@ -306,7 +312,7 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
     stage.SetEditTarget(stage.GetSessionLayer())
     expanded_instances = set[str]()
     for word, variant in variants:
-        sets = _variant_sets(pxr, stage)
+        sets = _prims_by_variant_set(pxr, stage)
         while inside := [prim for prim in sets.get(word, []) if prim.IsInstanceProxy()]:
             for prim in inside:
                 outer = prim.GetParent()
@@ -314,7 +320,7 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
                     outer = outer.GetParent()
                 outer.SetInstanceable(False)
                 expanded_instances.add(str(outer.GetPath()))
-            sets = _variant_sets(pxr, stage)
+            sets = _prims_by_variant_set(pxr, stage)
         if word not in sets:
             raise UnknownNameError("variant set", word, list(sets), where=name)
         own = [prim.GetVariantSet(word) for prim in sets[word]]
@@ -326,7 +332,7 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
     return frozenset(expanded_instances)
 
 
-def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
+def _prims_by_variant_set(pxr: Any, stage: Any) -> dict[str, list[Any]]:
     sets: dict[str, list[Any]] = {}
     every = pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
     for prim in pxr.Usd.PrimRange.Stage(stage, every):
@@ -420,7 +426,7 @@ class _StageReader:
         rest = np.array([self._world_pose(stage.GetPrimAtPath(path))[0] for path in links.values()])
         rest_q = self._find_rest_configuration(tree, chosen, links, rest)
         self._report_unit_and_up_axis(rest)
-        self._report_layers([*links.values(), *self._joints_read])
+        self._report_layer_differences([*links.values(), *self._joints_read])
         if count := sum(prim.IsA(pxr.UsdGeom.Gprim) for prim in prims):
             self._report("unused-in-usd", "", f"kinematics does not use the {count} shapes")
         return Usd(
@@ -601,7 +607,7 @@ class _StageReader:
             if len(targets) > 1:
                 self._report("left-out-of-usd", path, f"body{i} of this joint has {len(targets)} targets")
                 return None
-            side = self._read_side(prim, i, str(targets[0]) if targets else None)
+            side = self._read_joint_frame(prim, i, str(targets[0]) if targets else None)
             if side is None:
                 instanced = self._is_instanced(targets[0])
                 reason = "is a prototype of a PointInstancer" if instanced else "does not exist"
@@ -637,7 +643,7 @@ class _StageReader:
             prim, prim.GetName(), path, kind, axis, (first, second), (A, B), limits, size, rounded
         )
 
-    def _read_side(
+    def _read_joint_frame(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return four values for body i of a joint.
@@ -816,7 +822,7 @@ class _StageReader:
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
                 continue  # A single body that is fixed to the world is not a robot.
-            self._set_path(group)
+            self._set_articulation_path(group)
             merged.setdefault(self._find_root(group) or group.path, []).append(group)
         articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
         paths = Counter(group.path for group in articulations)
@@ -825,7 +831,7 @@ class _StageReader:
                 group.path = self._find_root(group) or group.bodies[0]
         return articulations
 
-    def _set_path(self, group: _Articulation) -> None:
+    def _set_articulation_path(self, group: _Articulation) -> None:
         for edge in group.edges:
             if edge.prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 group.path = edge.path
@@ -1002,18 +1008,20 @@ class _StageReader:
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         turns = edge.kind is JointKind.REVOLUTE
-        if turns and _NEGLIGIBLE_DEGREES < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
+        if turns and _NEGLIGIBLE_LIMIT_DEGREES < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            absent, value = "limits", f"+-{SLIDE_LIMIT:g}"
+            absent, value = "limits", f"+-{FALLBACK_PRISMATIC_LIMIT:g}"
             if math.isfinite(lower) or math.isfinite(upper):
                 absent, value = ("an upper limit", "+") if math.isfinite(lower) else ("a lower limit", "-")
-                value += f"{SLIDE_LIMIT:g}"
+                value += f"{FALLBACK_PRISMATIC_LIMIT:g}"
             what = f"a prismatic joint without {absent} gets {value} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
-            lower, upper = (x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper))
+            lower, upper = (
+                x if math.isfinite(x) else math.copysign(FALLBACK_PRISMATIC_LIMIT, x) for x in (lower, upper)
+            )
         return Limit(lower, upper, rate, math.inf)
 
     def _find_frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -1028,7 +1036,7 @@ class _StageReader:
                 kind = child.GetTypeName()
                 if kind == "Scope":
                     yield from below(child, body)
-                if kind != "Xform" or child.GetName().lower() in _SHAPE_GROUPS:
+                if kind != "Xform" or child.GetName().lower() in _SHAPE_XFORM_NAMES:
                     continue
                 inside = self.pxr.Usd.PrimRange(child, self.pxr.Usd.TraverseInstanceProxies())
                 groups_shapes = (
@@ -1156,7 +1164,7 @@ class _StageReader:
             what = f"the stage has no upAxis, so {self.pxr.UsdGeom.GetStageUpAxis(self.stage)} is up"
             self._report("up-axis", "", what, 'write upAxis = "Z"')
 
-    def _report_layers(self, paths: Sequence[str]) -> None:
+    def _report_layer_differences(self, paths: Sequence[str]) -> None:
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1166,9 +1174,9 @@ class _StageReader:
                 if layer not in known:
                     known.add(layer)
                     name = os.path.relpath(layer.identifier, Path(root.realPath).parent)
-                    self._report_layer(layer.pseudoRoot, name, prim)
+                    self._report_layer_difference(layer.pseudoRoot, name, prim)
 
-    def _report_layer(self, root: Any, name: str, prim: Any) -> None:
+    def _report_layer_difference(self, root: Any, name: str, prim: Any) -> None:
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))

@@ -27,12 +27,12 @@ from urdfkin.urdf.lint.rules import bodies, dialect, joints, left_out
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
-_MODULES = (parser, dialect, joints, bodies)
+_RULE_MODULES = (parser, dialect, joints, bodies)
 
 #: The rules about URDF files, indexed by module name.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
-    for module in _MODULES
+    for module in _RULE_MODULES
 }
 
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
@@ -74,7 +74,9 @@ def page(code: str) -> Page:
 def page_files() -> dict[str, Traversable]:
     from importlib import resources
 
-    packages = {module.__name__.rpartition(".")[2]: module.__package__ for module in (*_MODULES, left_out)}
+    packages = {
+        module.__name__.rpartition(".")[2]: module.__package__ for module in (*_RULE_MODULES, left_out)
+    }
     return {topic: resources.files(str(package)) / f"{topic}.toml" for topic, package in packages.items()}
 
 

@@ -42,7 +42,7 @@ from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
-_FIELDS = ("file", "code", "severity", "element", "name", "found")
+_BASELINE_FIELDS = ("file", "code", "severity", "element", "name", "found")
 
 
 def key_of(finding: Finding, file: str) -> Key:
@@ -92,7 +92,7 @@ def read_baseline(path: Path) -> Baseline:
         if document["schema"] != "urdfkin-baseline" or document["version"] != BASELINE_VERSION:
             raise ValueError
         for entry in document["findings"]:
-            counts[tuple(str(entry[name]) for name in _FIELDS)] = int(entry["count"])
+            counts[tuple(str(entry[name]) for name in _BASELINE_FIELDS)] = int(entry["count"])
     except (ValueError, TypeError, LookupError, RecursionError):
         remedy = "write a baseline with: urdfkin check --write-baseline FILE ..."
         raise InputError("this file is not a baseline of urdfkin", where=str(path), remedy=remedy) from None
@@ -111,7 +111,9 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
         older = read_baseline(path).counts
         others = [key for key in older if key[0] not in checked and (path.parent / key[0]).exists()]
         counts |= Counter({key: older[key] for key in others})
-    entries = [dict(zip(_FIELDS, key, strict=True)) | {"count": n} for key, n in sorted(counts.items())]
+    entries = [
+        dict(zip(_BASELINE_FIELDS, key, strict=True)) | {"count": n} for key, n in sorted(counts.items())
+    ]
     document = {"schema": "urdfkin-baseline", "version": BASELINE_VERSION, "findings": entries}
     return json.dumps(document, indent=1) + "\n"
 
@@ -229,7 +231,7 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
 
 
 #: Suffixes of files that a xacro file can include.
-_INCLUDABLE_SUFFIXES = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
+_XACRO_INCLUDE_SUFFIXES = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +276,7 @@ def find_known_findings(
     """Return the findings of a file's older version; None for an unchanged file without new findings.
 
     An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
-    If a file with a suffix of `_INCLUDABLE_SUFFIXES` has changed, all findings of the xacro file are new.
+    If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file are new.
     Second, a mesh file that exists in the older version may be missing now. If the URDF contains the
     name of a file deleted since that version, all findings about missing meshes are new.
     """
@@ -286,7 +288,7 @@ def find_known_findings(
         # All findings count as new after a change of the xacro file.
         # The same applies to files that the xacro file may include.
         is_new = not version.contains(read_bytes(path))
-        return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
+        return Baseline(Counter()) if is_new or version.has_changes(_XACRO_INCLUDE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
     old_data = text.data if is_unchanged else version.read_file(path)
     findings = () if old_data is None else examine(replace(text, data=old_data)).findings
