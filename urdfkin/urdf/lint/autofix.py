@@ -134,7 +134,7 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     equal = {
         "name, type, parent or child": names_a == names_b,
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
-        "orientation": rotation <= Fraction(max_rotation) * _SLACK,
+        "orientation": rotation <= Fraction(max_rotation) * _ROTATION_SUM_FACTOR,
         "axis": a.kind not in AXIAL_TYPES or _same_direction(a.axis, b.axis),
         "limit": _effective_limits(a) == _effective_limits(b),
         "mimic": a.kind == "fixed" or _mimic_rule(a) == _mimic_rule(b),
@@ -143,7 +143,7 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
 
 
 #: Factor that covers the rounding errors in the sum of rotations `max_rotation`.
-_SLACK = 1 + Fraction(1, 2**50)
+_ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:

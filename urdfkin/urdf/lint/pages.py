@@ -35,13 +35,13 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
     for module in _RULE_MODULES
 }
 
-RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
+URDF_RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
 #: The rules about MJCF and USD files.
 MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
 CODE_BY_NAME = {
-    word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
+    word: rule.id for rule in URDF_RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
 }
 
 _TOPIC_OF_CODE = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
@@ -110,7 +110,7 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    known, name = RULES | MJCF_AND_USD_RULES, word.strip().lower()
+    known, name = URDF_RULES | MJCF_AND_USD_RULES, word.strip().lower()
     codes = CODE_BY_NAME | {
         name: rule.id for rule in MJCF_AND_USD_RULES.values() for name in (rule.id.lower(), rule.slug)
     }
@@ -127,7 +127,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     """
     prefix = word.strip().upper()
     prefix = f"URDF{prefix}" if prefix.isdigit() else prefix
-    every = RULES | MJCF_AND_USD_RULES
+    every = URDF_RULES | MJCF_AND_USD_RULES
     family = tuple(rule for rule in every.values() if rule.id.startswith(prefix))
     if prefix == "ALL":
         return tuple(every.values())

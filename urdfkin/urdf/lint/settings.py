@@ -45,7 +45,7 @@ Key = tuple[str, ...]
 _BASELINE_FIELDS = ("file", "code", "severity", "element", "name", "found")
 
 
-def key_of(finding: Finding, file: str) -> Key:
+def baseline_key(finding: Finding, file: str) -> Key:
     words = (finding.severity.value, finding.element or "", finding.name or "", finding.found or "")
     return (file, finding.code, *words)
 
@@ -64,7 +64,7 @@ class Baseline:
     match_count: int = 0
 
     def consume(self, finding: Finding) -> bool:
-        key = key_of(finding, relative_path(finding.file, self.root))
+        key = baseline_key(finding, relative_path(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
         self.counts[key] -= 1
@@ -105,7 +105,7 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     If the file `path` contains an older baseline, the function also copies entries of the older baseline. The
     function does not copy entries about a file in `files` or about a deleted file.
     """
-    counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
+    counts = Counter(baseline_key(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
         checked = {relative_path(file, path.parent) for file in files}
         older = read_baseline(path).counts
@@ -296,11 +296,13 @@ def find_known_findings(
         findings = tuple(finding for finding in findings if finding.code != MESH_MISSING.id)
     elif is_unchanged:
         return None
-    return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in findings))
+    return Baseline(
+        Counter(baseline_key(finding, relative_path(finding.file, Path())) for finding in findings)
+    )
 
 
 #: urdfkin and ROS's build tools skip folders with one of these files.
-IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+FOLDER_IGNORE_FILES = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def find_files(
@@ -317,7 +319,7 @@ def find_files(
         files = sorted(_walk_folder(path, settings.root, include, exclude))
         remedy = f"searched for {', '.join(include)}, except in hidden and excluded folders"
     elif glob.has_magic(argument) and not may_exist(path):
-        files = [file for file in _expand_pattern(argument) if not matches(file, exclude, settings.root)]
+        files = [file for file in _find_matching_files(argument) if not matches(file, exclude, settings.root)]
         remedy = None
     else:
         return [f"./{argument}" if argument.lstrip().startswith("<") else argument]
@@ -328,7 +330,7 @@ def find_files(
 
 def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[str]) -> Iterator[str]:
     for here, folders, files in os.walk(folder):
-        if any(name in IGNORE_MARKERS for name in files):
+        if any(name in FOLDER_IGNORE_FILES for name in files):
             folders.clear()
             continue
         place = Path(here)
@@ -341,7 +343,7 @@ def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequ
         yield from (unambiguous_path(file) for file in named if not matches(str(file), exclude, root))
 
 
-def _expand_pattern(pattern: str) -> list[str]:
+def _find_matching_files(pattern: str) -> list[str]:
     # Path.glob does not accept absolute patterns.
     names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207  Path.glob() refuses some patterns
     return sorted(unambiguous_path(name) for name in names if not is_folder(name))

@@ -32,7 +32,7 @@ NEGLIGIBLE_MOMENT = 1e-9
 #: Exporters write moments of inertia with few digits.
 _MOMENT_PRECISION = 1e-6
 
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def check_inertials(report: Reporter, robot: RobotRecord) -> None:
@@ -49,7 +49,7 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     if mass_element is not None and "value" not in mass_element.attributes:
         missing.append("value of <mass>")
     if tensor is not None:
-        missing += [name for name in _MOMENTS if name not in tensor.attributes]
+        missing += [name for name in _INERTIA_ATTRIBUTES if name not in tensor.attributes]
     if missing:
         message = "<inertial> is incomplete"
         remedy = "write <mass> and all six moments of <inertia>, or remove <inertial>"
@@ -61,9 +61,9 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     mass = None if mass_element is None else numbers.read_scalar(mass_element, "value")
     _check_mass(report, inertial, mass, lever)
     if tensor is not None:
-        read = (numbers.read_scalar(tensor, name) for name in _MOMENTS)
+        read = (numbers.read_scalar(tensor, name) for name in _INERTIA_ATTRIBUTES)
         moments = [moment for moment in read if moment is not None]
-        if len(moments) == len(_MOMENTS):
+        if len(moments) == len(_INERTIA_ATTRIBUTES):
             _check_moments(report, tensor, moments, mass)
 
 
@@ -131,7 +131,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 
 
 UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
-GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
+GEOMETRY_INCOMPLETE = Rule("URDF705", "geometry-incomplete", WARNING)
 
 #: Numeric attributes of each shape:
 #: name, count of numbers, and whether the attribute is required.
@@ -163,12 +163,12 @@ def _check_geometry(
     if capsule is not None and version < (1, 1):  # URDF readers skip capsules in files before version 1.1.
         message = 'a capsule needs version="1.1" and is ignored'
         remedy = 'write version="1.1" in <robot>, or use a cylinder and two spheres'
-        report.add(GEOMETRY, message, capsule, remedy=remedy)
+        report.add(GEOMETRY_INCOMPLETE, message, capsule, remedy=remedy)
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None or shape.tag not in _SHAPES:
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
         report.add(
-            GEOMETRY,
+            GEOMETRY_INCOMPLETE,
             f"the {owner.tag} contains no shape that URDF defines",
             geometry or owner,
             found=lacks if shape is None else f"<{shape.tag}>",
@@ -191,7 +191,7 @@ def _check_geometry(
 
 def _report_missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
     message = f"the {shape.tag} of a {owner.tag} has no {attribute}"
-    report.add(GEOMETRY, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
+    report.add(GEOMETRY_INCOMPLETE, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
 
 
 MATERIAL_UNKNOWN = Rule("URDF708", "material-unknown", WARNING)

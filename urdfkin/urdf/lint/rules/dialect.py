@@ -68,7 +68,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
         if key.startswith("xmlns:")
     }
     xacro = {prefix for prefix, uri in namespaces.items() if _XACRO_NAMESPACE.match(uri)} | {"xacro"}
-    macros: list[_Occurrence] = []
+    macros: list[_ElementOrAttribute] = []
     for element in root.walk():
         prefix, _, local = element.tag.rpartition(":")
         if prefix in xacro:
@@ -82,7 +82,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
         report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_level_element.tag == "joint"
     ):
         return
-    expressions: list[_Occurrence] = [
+    expressions: list[_ElementOrAttribute] = [
         (element, key)
         for element in walk_outside_extensions(root)
         for key, value in element.attributes.items()
@@ -97,11 +97,11 @@ _EXPAND_REMEDY = (
 
 #: An element and the name of an attribute.
 #: The name None means the element itself.
-_Occurrence = tuple[Element, str | None]
+_ElementOrAttribute = tuple[Element, str | None]
 
 
 def _report_xacro(
-    report: Reporter, what: str, places: Sequence[_Occurrence], is_used: Callable[[Element], bool]
+    report: Reporter, what: str, places: Sequence[_ElementOrAttribute], is_used: Callable[[Element], bool]
 ) -> bool:
     """Report unexpanded xacro in `places`; return whether kinematics uses any element of `places`."""
     used = [place for place in places if is_used(place[0])]
@@ -145,14 +145,16 @@ DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
 #: Extension elements may contain anything, even `<joint>` and `<link>`.
-OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
+EXTENSION_ELEMENTS = frozenset(
+    {"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"}
+)
 
 #: Common elements and attributes of simulators and vendors.
-_COMMON_EXTENSIONS = (
+_VENDOR_NAMES_TEXT = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
-EXTENSIONS = frozenset(_COMMON_EXTENSIONS.split())
+VENDOR_NAMES = frozenset(_VENDOR_NAMES_TEXT.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: If a line has no colon, the attributes of the element are not checked.
@@ -184,11 +186,11 @@ ATTRIBUTES = {
 }
 
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
-_POSE_NAMES_ELSEWHERE = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
+_POSE_NAMES_OF_OTHER_FORMATS = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Names that URDF, a simulator or another format defines.
 #: `--fix` does not remove attributes with these names.
-_DEFINED_ELSEWHERE = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_ELSEWHERE | EXTENSIONS
+_KEPT_ATTRIBUTES = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_OF_OTHER_FORMATS | VENDOR_NAMES
 
 #: Child elements that may occur only once.
 _SINGLE_CHILDREN = {
@@ -200,7 +202,7 @@ _SINGLE_CHILDREN = {
 _ELEMENTS_WITHOUT_TEXT = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
 #: Elements whose text probably belongs in an attribute.
-_VECTORS = ("origin", "axis")
+_VECTOR_ELEMENTS = ("origin", "axis")
 
 
 def check_vocabulary(report: Reporter, root: Element) -> None:
@@ -214,7 +216,7 @@ def check_vocabulary(report: Reporter, root: Element) -> None:
         _check_text(report, element)
         _check_repeats(report, element)
         for child in element.children:
-            if child.tag not in known and child.tag not in OPAQUE and ":" not in child.tag:
+            if child.tag not in known and child.tag not in EXTENSION_ELEMENTS and ":" not in child.tag:
                 _check_unknown(report, child, known)
         stack += [child for child in reversed(element.children) if child.tag in known]
 
@@ -233,18 +235,18 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         return
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
     parent = element.parent
-    if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
+    if parent is not None and parent.tag in _VECTOR_ELEMENTS and element.text and not parent.attributes:
         message, found = f"the value inside <{element.tag}> is skipped", quote(element.text)
         remedy = f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}"
         report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=Severity.ERROR)
         return
     message = f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; the element is skipped"
     remedy = f"did you mean <{close}>?" if close else "remove the element"
-    if element.tag in _POSE_NAMES_ELSEWHERE:
+    if element.tag in _POSE_NAMES_OF_OTHER_FORMATS:
         remedy = f"write {_EXAMPLES['origin']}"
-    elif element.tag in EXTENSIONS:
+    elif element.tag in VENDOR_NAMES:
         remedy = "keep the element if another program needs it"
-    severity = Severity.NOTE if element.tag in EXTENSIONS else None
+    severity = Severity.NOTE if element.tag in VENDOR_NAMES else None
     report.add(UNKNOWN_ELEMENT, message, element, remedy=remedy, severity=severity)
 
 
@@ -254,7 +256,7 @@ def walk_outside_extensions(element: Element) -> Iterator[Element]:
     while stack:
         element = stack.pop()
         yield element
-        stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
+        stack += [child for child in reversed(element.children) if child.tag not in EXTENSION_ELEMENTS]
 
 
 def _is_link_or_joint(element: Element) -> bool:
@@ -289,9 +291,9 @@ def _check_attributes(report: Reporter, element: Element) -> None:
             attribute=attribute,
             found=f"{attribute}={quote(element.attributes[attribute])}",
             remedy=f"did you mean {close}?" if close else every,
-            severity=Severity.NOTE if attribute in EXTENSIONS else None,
+            severity=Severity.NOTE if attribute in VENDOR_NAMES else None,
             fix=None
-            if close or attribute in _DEFINED_ELSEWHERE
+            if close or attribute in _KEPT_ATTRIBUTES
             else partial(report.make_removal_fix, element, attribute),
         )
 
@@ -301,7 +303,7 @@ def _check_text(report: Reporter, element: Element) -> None:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
         return  # Another finding already quotes this text.
-    lost = element.tag in _VECTORS and not element.attributes
+    lost = element.tag in _VECTOR_ELEMENTS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     message, found = f"text inside <{element.tag}> is skipped", quote(element.text)
     remedy = f"write the value as an attribute, as in {example}" if example else "remove the text"
@@ -346,8 +348,8 @@ def check_prefixes(report: Reporter, root: Element) -> None:
         report.add(UNDECLARED_PREFIX, message, element, attribute=attribute, found=found, remedy=remedy)
 
 
-def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
-    found: dict[str, list[_Occurrence]] = {}
+def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribute]]:
+    found: dict[str, list[_ElementOrAttribute]] = {}
     declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes xml and xmlns.
     stack = [(root, False)]
     while stack:
@@ -380,7 +382,7 @@ def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
 
 
 RESERVED_NAME = Rule("URDF403", "reserved-name", WARNING)
-UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
+NAME_UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
 ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 LINE_BREAK_IN_NAME = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
@@ -435,7 +437,7 @@ def _check_line_breaks_in_name(report: Reporter, element: Element) -> None:
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
     if name == "universe" and element.tag == "joint":
         message = "Pinocchio uses this name for the world and does not find the joint"
-        report.add(UNIVERSE, message, element, attribute="name", remedy="rename the joint")
+        report.add(NAME_UNIVERSE, message, element, attribute="name", remedy="rename the joint")
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
         remedy = (
