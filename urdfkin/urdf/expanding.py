@@ -23,7 +23,7 @@ from urdfkin.urdf.xacro import find_arguments
 _FORBIDDEN_SYMBOLS = ("type", "vars")
 
 #: Test expression that xacro alone evaluates, and urdfkin refuses.
-_PROBE = "${(lambda: 1)()}"
+_TEST_EXPRESSION = "${(lambda: 1)()}"
 
 _TOO_MUCH_MEMORY = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
@@ -91,7 +91,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: Al
     substitution_args._eval = evaluate_substitution  # This function evaluates `$(eval ...)`.
     xacrodoc.packages.get_path = _make_package_finder(path, search, allowed_paths)
     try:
-        xacro.eval_text(_PROBE, symbols)
+        xacro.eval_text(_TEST_EXPRESSION, symbols)
     except xacro.XacroException as error:
         if isinstance(error.exc, RefusedError):
             return

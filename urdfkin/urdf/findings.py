@@ -47,7 +47,7 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
 #: In such a line, at most `MAX_EXCERPT_LEAD` characters precede the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
-_TAB = "    "
+_TAB_SPACES = "    "
 
 
 class ExcerptFormatter:
@@ -80,7 +80,7 @@ class ExcerptFormatter:
         last = first + MAX_EXCERPT_LENGTH
         end = min(start + finding.width, last)
         pieces = self.text[first:start], self.text[start:end], self.text[end:last]
-        before, marked, after = (escape_unprintable(piece.replace("\t", _TAB)) for piece in pieces)
+        before, marked, after = (escape_unprintable(piece.replace("\t", _TAB_SPACES)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
         caret = " " * (_display_width(lead) + _display_width(before)) + "^" * max(_display_width(marked), 1)

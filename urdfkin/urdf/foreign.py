@@ -22,7 +22,7 @@ from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.mjcf import FALLBACK_PRISMATIC_LIMIT, make_fixed_joint, make_unique
-from urdfkin.urdf.parser import QUATERNION
+from urdfkin.urdf.parser import QUAT_XYZW
 from urdfkin.urdf.reader import find_root_link, make_joint_rows
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
 from urdfkin.urdf.writer import to_urdf
@@ -82,7 +82,7 @@ def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
         " the file gives the rotation by quat_xyzw"
     )
     remedy = "if the file contains quat_xyzw, load the file instead of the yourdfpy robot"
-    return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
+    return (Finding(QUAT_XYZW.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
 def convert_yourdfpy_robot(robot: yourdf.Robot) -> str:
@@ -186,7 +186,7 @@ class _ModelReader:
         self.kinds = [str(frame.type) for frame in self.frames]
         self.used_link_names, self.used_joint_names = set[str](), set(map(str, model.names))
         self.placements = [np.array(frame.placement.homogeneous) for frame in self.frames]
-        self.bodies = dict(self._bodies_on_joints())
+        self.bodies = dict(self._find_bodies_at_joint_frames())
         joints = range(int(model.njoints))
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
@@ -197,7 +197,7 @@ class _ModelReader:
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
-    def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
+    def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
         """For each body whose frame is a joint frame, yield the index of the joint and of the body.
 
         The bodies are in reverse order. In a dictionary of the pairs, the first body of a joint therefore

@@ -135,7 +135,7 @@ class Mjcf:
         index = mujoco.mj_name2id(self.fused_model, what, name) if name else -1
         return (kind, index) if index >= 0 else None
 
-    def distance_bounds(self, q: FloatArray) -> FloatArray:
+    def origin_distance_bounds(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
         The bound is the sum of the lengths of all translations from the world to the frame.
@@ -151,9 +151,9 @@ class Mjcf:
                     own = own + qpos[:, to] + abs(m.qpos0[to])
                 own = own + 2.0 * np.linalg.norm(m.jnt_pos[j])
             at_body[:, i] = at_body[:, m.body_parentid[i]] + own
-        return self._frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
+        return self._make_frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
 
-    def reference_angles(self, q: FloatArray) -> FloatArray:
+    def hinge_angle_sums(self, q: FloatArray) -> FloatArray:
         """Return the sum of |q| + |ref| (rad) over the hinges of each frame, shape (n, frames).
 
         The hinges of a frame are the hinges between the world and the frame. A hinge is omitted if its
@@ -166,7 +166,7 @@ class Mjcf:
             for _, kind, to in self._body_joints(i):
                 if kind == "hinge" and m.qpos0[to]:
                     at_body[:, i] += qpos[:, to] + abs(m.qpos0[to])
-        return self._frame_values(at_body, np.zeros(m.nsite))
+        return self._make_frame_values(at_body, np.zeros(m.nsite))
 
     def _body_joints(self, body: int) -> Iterator[tuple[int, str, int]]:
         m, kinds = self.model, import_mujoco().mjtJoint
@@ -174,7 +174,7 @@ class Mjcf:
         for j in _joint_indices(m, body):
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
-    def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
+    def _make_frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
         """Return one number for each sample and frame, shape (n, frames).
 
         `at_body` has the shape (n, bodies), and `own` has the shape (sites,). The columns of the
@@ -355,7 +355,7 @@ def is_text(source: object) -> bool:
 
 #: Lists of MuJoCo's model that kinematics does not use.
 #: Keys are attributes of `MjSpec`; values are the singulars in messages.
-_SINGULAR = {
+_UNUSED_ELEMENTS = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
     "lights": "light", "meshes": "mesh", "hfields": "hfield", "materials": "material", "textures": "texture",
@@ -363,7 +363,7 @@ _SINGULAR = {
 
 
 def _find_unused_elements(spec: Any) -> Iterator[tuple[str, list[Any]]]:
-    for words in _SINGULAR:
+    for words in _UNUSED_ELEMENTS:
         if found := list(getattr(spec, words, ())):
             yield words, found
 
@@ -381,7 +381,7 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
             yield MjcfRemark(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(
-            f"{len(found)} {words if len(found) > 1 else _SINGULAR[words]}"
+            f"{len(found)} {words if len(found) > 1 else _UNUSED_ELEMENTS[words]}"
             for words, found in useless.items()
         )
         yield MjcfRemark(f"kinematics does not use {counts}")

@@ -49,8 +49,8 @@ from urdfkin.urdf.records import (
 
 # -- bytes
 
-EMPTY = Rule("URDF101", "empty-file", ERROR)
-ENCODING = Rule("URDF102", "not-utf8", ERROR)
+EMPTY_FILE = Rule("URDF101", "empty-file", ERROR)
+NOT_UTF8 = Rule("URDF102", "not-utf8", ERROR)
 DECLARED_ENCODING = Rule("URDF103", "declared-encoding", ERROR)
 UNUSED_DECLARED_ENCODING = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
@@ -75,11 +75,11 @@ def read_utf8(report: Reporter, data: bytes) -> bytes | None:
     """Return the UTF-8 bytes without a byte order mark; None after an error."""
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
-        report.add(EMPTY, what, remedy="check the program that wrote the file")
+        report.add(EMPTY_FILE, what, remedy="check the program that wrote the file")
         return None
     wide = next((encoding for encoding, begins in _WIDE_ENCODINGS.items() if data.startswith(begins)), None)
     if wide is not None:
-        report.add(ENCODING, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
+        report.add(NOT_UTF8, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
         return None
     text = data.removeprefix(codecs.BOM_UTF8)
     declared = _declared_encoding(text)
@@ -102,7 +102,7 @@ def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     if zero >= 0:
         message = "the text contains a zero byte: some readers stop there, others continue"
         remedy = "check the file: it is not a text file, or it is damaged"
-        report.add(ENCODING, message, remedy=remedy, position=line_and_column(text, zero))
+        report.add(NOT_UTF8, message, remedy=remedy, position=line_and_column(text, zero))
         return False
     try:
         text.decode("utf-8")
@@ -111,7 +111,7 @@ def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
         message = f"a byte is not UTF-8{claim}"
         remedy = "save the file as UTF-8"
         found = f"0x{text[error.start]:02x}"
-        report.add(ENCODING, message, found=found, remedy=remedy, position=line_and_column(text, error.start))
+        report.add(NOT_UTF8, message, found=found, remedy=remedy, position=line_and_column(text, error.start))
         return False
     return True
 
@@ -171,7 +171,7 @@ INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
 #: Maximum depth of nested elements in older versions of libxml2.
-COMMON_DEPTH = 256
+LIBXML2_DEPTH = 256
 
 #: Maximum number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
@@ -207,8 +207,8 @@ def read_document(report: Reporter) -> Element | None:
     except expat.ExpatError as error:
         builder.report_syntax_error(error)
         return None
-    if builder.max_depth > COMMON_DEPTH:
-        rule, reader, most = DEEP_NESTING, "older readers built on libxml2 refuse", COMMON_DEPTH
+    if builder.max_depth > LIBXML2_DEPTH:
+        rule, reader, most = DEEP_NESTING, "older readers built on libxml2 refuse", LIBXML2_DEPTH
         if builder.max_depth > ORACLE_DEPTH:
             rule, reader, most = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
         what = f"elements are nested {builder.max_depth} deep"
@@ -368,7 +368,7 @@ class _Builder:
             self.report_undefined_entity(self._entity_name())
             return
         innermost = self.open[-1] if self.open else None
-        message, remedy = _REASONS.get(reason, (reason, None))
+        message, remedy = _TEXTS_BY_EXPAT_ERROR.get(reason, (reason, None))
         if innermost is not None:
             opened = f"<{innermost.tag}>, opened on line {innermost.line},"
             if reason == expat.errors.XML_ERROR_TAG_MISMATCH:
@@ -394,7 +394,7 @@ _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
 #: Pairs (message, remedy or None) for each message of expat.
-_REASONS: dict[str, tuple[str, str | None]] = {
+_TEXTS_BY_EXPAT_ERROR: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
     expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
@@ -521,7 +521,7 @@ class NumberReader:
             element, attribute, raw_value, count * self.report.limits.number
         ):
             return
-        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw_value))
+        seen = html.unescape(_LEADING_ZEROS_OF_REFERENCE.sub(r"\1", raw_value))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
         if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
             self._report_refused_by_urdfdom(
@@ -549,7 +549,7 @@ class NumberReader:
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
-_LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
+_LEADING_ZEROS_OF_REFERENCE = re.compile(r"(&#[xX]?)0+")
 
 #: Patterns of invalid numbers, with remedies. The first matching pattern determines the remedy.
 _REMEDIES = (
@@ -586,7 +586,7 @@ EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
 MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
 IGNORED_VALUE = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
-QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
+QUAT_XYZW = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
@@ -699,7 +699,7 @@ class JointReader:
         self._read_axis(joint)
         self._read_limit(joint)
         self._read_mimic(joint)
-        self._check_unused_elements(joint)
+        self._check_nonkinematic_elements(joint)
         return joint
 
     def read_required(
@@ -772,7 +772,7 @@ class JointReader:
         else:
             joint.quaternion = quaternion
             message = "urdfkin uses quat_xyzw, but most readers ignore this rotation"
-            add(QUATERNION, message, "write the rotation as rpy for these readers")
+            add(QUAT_XYZW, message, "write the rotation as rpy for these readers")
 
     def _read_axis(self, joint: JointRecord) -> None:
         axis = joint.axis_element = joint.element.find("axis")
@@ -798,7 +798,7 @@ class JointReader:
         bounded = joint.kind in ("revolute", "prismatic")
         if limit is None:
             if bounded:
-                remedy = f"write {_EXAMPLE_LIMIT}"
+                remedy = f"write {_LIMIT_EXAMPLE}"
                 if joint.kind == "revolute":
                     remedy += ', or type="continuous" if the joint rotates without limits'
                 what = f"a {joint.kind} joint needs a <limit>"
@@ -806,7 +806,7 @@ class JointReader:
             return
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
         for attribute in required:
-            self.read_required(limit, attribute, _EXAMPLE_LIMIT, number=True)
+            self.read_required(limit, attribute, _LIMIT_EXAMPLE, number=True)
         names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
         values = {name: self.numbers.read_scalar(limit, name) for name in names}
         joint.limit = LimitRecord(limit, **values)
@@ -821,7 +821,7 @@ class JointReader:
         if mimicked_joint is not None and multiplier is not None and offset is not None:
             joint.mimic = MimicRecord(mimic, mimicked_joint, multiplier, offset)
 
-    def _check_unused_elements(self, joint: JointRecord) -> None:
+    def _check_nonkinematic_elements(self, joint: JointRecord) -> None:
         """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""
         dynamics, safety = (joint.element.find(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
@@ -835,7 +835,7 @@ class JointReader:
                     self.numbers.read_scalar(element, attribute)
 
 
-_EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
+_LIMIT_EXAMPLE = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
 #: Numeric attributes without effect on kinematics.
 _UNUSED_NUMBERS = {

@@ -88,7 +88,7 @@ _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: URDF mimic rules are linear.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
-_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+_MOTION_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xform prims that contain the shapes of a body.
 _SHAPE_XFORM_NAMES = ("visual", "visuals", "collision", "collisions")
 #: Rotation of the y axis onto the z axis.
@@ -402,7 +402,7 @@ class _StageReader:
     _meters_per_unit: float = 1.0
     _up: FloatArray = field(default_factory=lambda: np.eye(3))
     _cache: Any = None
-    _instancers: list[str] = field(default_factory=list)
+    _point_instancers: list[str] = field(default_factory=list)
     _checked_paths: set[str] = field(default_factory=set)
 
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
@@ -458,7 +458,7 @@ class _StageReader:
                 continue
             every.PruneChildren()
             path = str(prim.GetPath())
-            self._instancers.append(path + "/")
+            self._point_instancers.append(path + "/")
             below = list(self.pxr.Usd.PrimRange(prim, inside))
             bodies = sum(one.HasAPI(physics.RigidBodyAPI) for one in below)
             joints = sum(one.IsA(physics.Joint) for one in below)
@@ -509,7 +509,7 @@ class _StageReader:
                     return
             prim = prim.GetParent()
 
-    def _find_uneven_scale(self, prim: Any) -> str | None:
+    def _describe_uneven_scale(self, prim: Any) -> str | None:
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -533,7 +533,7 @@ class _StageReader:
         if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
             message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
-            raise InputError(message, where=where, found=self._find_uneven_scale(prim), remedy=remedy)
+            raise InputError(message, where=where, found=self._describe_uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
         return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._meters_per_unit), scale
 
@@ -549,7 +549,7 @@ class _StageReader:
             if scale[0] < 0.0:
                 what = "the transform of this body contains a reflection"
                 self._report("mirrored-body", path, what, "mirror the shapes instead")
-            self._bodies[path] = _Body(T, self._find_owner(prim))
+            self._bodies[path] = _Body(T, self._find_articulation_root(prim))
         for prim in prims:
             if prim.IsA(physics.Joint) and (edge := self._read_joint(prim)) is not None:
                 self._edges.append(edge)
@@ -586,7 +586,7 @@ class _StageReader:
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
-    def _find_owner(self, prim: Any) -> str | None:
+    def _find_articulation_root(self, prim: Any) -> str | None:
         """Return the path of the articulation root at or above a prim, or None."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
@@ -609,7 +609,7 @@ class _StageReader:
                 return None
             side = self._read_joint_frame(prim, i, str(targets[0]) if targets else None)
             if side is None:
-                instanced = self._is_instanced(targets[0])
+                instanced = self._is_in_point_instancer(targets[0])
                 reason = "is a prototype of a PointInstancer" if instanced else "does not exist"
                 what = f"body{i} of this joint names a prim that {reason}: {targets[0]}"
                 self._report("outside-joint", path, what, "correct the relationship")
@@ -668,7 +668,7 @@ class _StageReader:
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
-        if not other or not other.IsDefined() or self._is_instanced(target):
+        if not other or not other.IsDefined() or self._is_in_point_instancer(target):
             return None
         T, scale = self._world_pose(other)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
@@ -701,8 +701,8 @@ class _StageReader:
             prim = prim.GetParent()
         return SINGLE_ROUNDOFF * length if moved else 0.0, 2.0 * SINGLE_ROUNDOFF if turned else 0.0
 
-    def _is_instanced(self, path: object) -> bool:
-        return any(str(path).startswith(one) for one in self._instancers)
+    def _is_in_point_instancer(self, path: object) -> bool:
+        return any(str(path).startswith(one) for one in self._point_instancers)
 
     def _read_motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return kind, axis, limits (rad or m) and free directions; refuse an unsupported joint."""
@@ -730,7 +730,7 @@ class _StageReader:
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the result of `_read_motion` for a `PhysicsJoint`, which has limits for six directions."""
         limits: dict[str, tuple[float, float]] = {}
-        for direction in _DIRECTIONS:
+        for direction in _MOTION_DIRECTIONS:
             low, high = _NO_LIMITS
             if f"PhysicsLimitAPI:{direction}" in _schemas(prim):
                 low, high = (
@@ -743,7 +743,9 @@ class _StageReader:
             return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
         if len(free) == 1:
             return self._make_motion(path, free[0], iter(limits[free[0]]))
-        kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _DIRECTIONS: JointKind.FLOATING}.get(free)
+        kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _MOTION_DIRECTIONS: JointKind.FLOATING}.get(
+            free
+        )
         if kind is None:
             message = "urdfkin does not support a joint with these degrees of freedom"
             remedy = "leave one degree of freedom free, or write several joints with a body between them"
@@ -1181,24 +1183,28 @@ class _StageReader:
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
             factor = unit / self._meters_per_unit
-            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._is_scaled(prim, factor):
+            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._has_scale(prim, factor):
                 what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._meters_per_unit:g}"
                 remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
-        if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
+        if (
+            root.HasInfo(tokens.upAxis)
+            and root.GetInfo(tokens.upAxis) != up
+            and not self._has_units_resolve(prim)
+        ):
             what = f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up}"
             remedy = "rotate this prim, or save the layer with the up axis of the stage"
             self._report("up-axis", path, f"{what}; the layer is not rotated", remedy)
 
-    def _is_scaled(self, prim: Any, factor: float) -> bool:
+    def _has_scale(self, prim: Any, factor: float) -> bool:
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool(
             (np.abs(scale - 1.0) <= _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount).all()
         )
 
-    def _is_resolved(self, prim: Any) -> bool:
+    def _has_units_resolve(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
