@@ -27,7 +27,7 @@ def expanded(tmp_path: Path) -> Expand:
         path = tmp_path / "robot" / "urdf" / "r.xacro"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f'<robot name="r" {NAMESPACE}>{inside}</robot>')
-        return expand(path, arguments, patience=patience).decode()
+        return expand(path, arguments, timeout=patience).decode()
 
     return expanded
 

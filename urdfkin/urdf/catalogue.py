@@ -63,11 +63,11 @@ class CatalogueEntry:
         return (robots_dir() if self.is_bundled else example_robots_dir()) / self.relative_path
 
     @property
-    def base(self) -> str | None:
+    def base_frame(self) -> str | None:
         return next((base for base, _ in self.limbs.values()), None)
 
     @property
-    def tip(self) -> str | None:
+    def tip_frame(self) -> str | None:
         return next((tip for _, tip in self.limbs.values()), None)
 
 

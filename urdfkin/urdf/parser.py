@@ -189,11 +189,11 @@ class _StopError(Exception):
 
 def read_document(report: Reporter) -> Element | None:
     """Parse the file of `report` and return its root element; None after an error."""
-    data, most = report.data, report.limits.bytes
-    if len(data) > most:
+    data, max_bytes = report.data, report.limits.bytes
+    if len(data) > max_bytes:
         message = "the file is too large"
         remedy = "if the file is correct, raise the limit with --max-bytes"
-        report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {most}", remedy=remedy)
+        report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {max_bytes}", remedy=remedy)
         return None
     text = read_utf8(report, data)
     if text is None:
@@ -208,15 +208,15 @@ def read_document(report: Reporter) -> Element | None:
         builder.report_syntax_error(error)
         return None
     if builder.max_depth > LIBXML2_DEPTH:
-        rule, reader, most = DEEP_NESTING, "older readers built on libxml2 refuse", LIBXML2_DEPTH
+        rule, reader, max_depth = DEEP_NESTING, "older readers built on libxml2 refuse", LIBXML2_DEPTH
         if builder.max_depth > ORACLE_DEPTH:
-            rule, reader, most = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
+            rule, reader, max_depth = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
         what = f"elements are nested {builder.max_depth} deep"
         report.add(
             rule,
             what,
             builder.deepest_element,
-            remedy=f"remove the nesting: {reader} more than {most} levels",
+            remedy=f"remove the nesting: {reader} more than {max_depth} levels",
         )
     return builder.root
 
@@ -278,20 +278,24 @@ class _Builder:
         self.check_limits(tag, attributes)
 
     def check_limits(self, tag: str, attributes: dict[str, str]) -> None:
-        most = self.limits
-        if self.max_depth > most.depth:
-            self.refuse(TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels")
-        if self.count > most.elements:
-            self.refuse(TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}")
-        if len(attributes) > most.attributes:
-            found = f"{len(attributes)} in <{shorten(tag)}>, more than {most.attributes}"
+        size_limits = self.limits
+        if self.max_depth > size_limits.depth:
+            self.refuse(
+                TOO_DEEP, "depth", "elements are nested too deep", f"more than {size_limits.depth} levels"
+            )
+        if self.count > size_limits.elements:
+            self.refuse(
+                TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {size_limits.elements}"
+            )
+        if len(attributes) > size_limits.attributes:
+            found = f"{len(attributes)} in <{shorten(tag)}>, more than {size_limits.attributes}"
             self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
-        if len(tag) > most.name:
+        if len(tag) > size_limits.name:
             self.refuse_name("the tag of an element", tag)
         for key, value in attributes.items():
-            if len(key) > most.name:
+            if len(key) > size_limits.name:
                 self.refuse_name("the name of an attribute", key)
-            if len(value) > most.name and key in _NAME_ATTRIBUTES:
+            if len(value) > size_limits.name and key in _NAME_ATTRIBUTES:
                 self.refuse_name(f"the {key} of <{shorten(tag)}>", value)
 
     def refuse_name(self, what: str, name: str) -> None:
@@ -498,14 +502,14 @@ class NumberReader:
         self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
 
-    def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report a number with more than `most` characters.
+    def _is_too_long(self, element: Element, attribute: str, written: str, max_length: int) -> bool:
+        """Report a number with more than `max_length` characters.
 
         The conversion of a long text to a number takes quadratic time.
         """
-        if len(written) <= most:
+        if len(written) <= max_length:
             return False
-        found = f"{quote(written, 30)} of {len(written)} characters, more than {most}"
+        found = f"{quote(written, 30)} of {len(written)} characters, more than {max_length}"
         remedy = "write 17 digits, enough for every double, or raise the limit with --max-number"
         self.report.add(
             NUMBER_TOO_LONG, f"{attribute} is too long for a number", element,

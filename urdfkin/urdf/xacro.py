@@ -89,7 +89,7 @@ class XacroError(UrdfkinError):
     pass
 
 
-def expand(path: Path, arguments: Mapping[str, str], *, patience: float = EXPANSION_TIMEOUT) -> bytes:
+def expand(path: Path, arguments: Mapping[str, str], *, timeout: float = EXPANSION_TIMEOUT) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
     Raise SourceError for a missing file, UnknownNameError for an undeclared argument, and XacroError if
@@ -105,10 +105,10 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = EXPANS
         "from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = run_python(
-        command, _make_request(path.absolute(), arguments, patience), patience, MAX_EXPANDED_BYTES
+        command, _make_request(path.absolute(), arguments, timeout), timeout, MAX_EXPANDED_BYTES
     )
     if status is None:
-        raise XacroError("xacro did not finish", where=str(path), found=f"{patience:g} s")
+        raise XacroError("xacro did not finish", where=str(path), found=f"{timeout:g} s")
     if len(output) > MAX_EXPANDED_BYTES:
         raise XacroError(
             "the expanded URDF is too long", where=str(path), found=f"more than {MAX_EXPANDED_BYTES} bytes"
@@ -132,7 +132,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = EXPANS
     )
 
 
-def _make_request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
+def _make_request(path: Path, arguments: Mapping[str, str], timeout: float) -> bytes:
     paths = {
         name: [str(folder.absolute()) for folder in search_path(name)] for name in PACKAGE_PATH_VARIABLES
     }
@@ -142,7 +142,7 @@ def _make_request(path: Path, arguments: Mapping[str, str], patience: float) -> 
         "arguments": dict(arguments),
         "search": {name: os.pathsep.join(folders) for name, folders in paths.items()},
         "allowed_paths": asdict(AllowedPaths.of_file(path, installed, list(arguments.values()))),
-        "seconds": ceil(patience) + 1,
+        "seconds": ceil(timeout) + 1,
     }
     return json.dumps(request).encode()
 

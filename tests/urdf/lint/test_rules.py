@@ -24,7 +24,7 @@ from urdfkin.urdf.lint.pages import (
     explain,
     find_rule,
     page,
-    page_files,
+    page_file_by_topic,
     topic_pages,
 )
 
@@ -88,7 +88,7 @@ def test_codes_and_texts_of_rules_have_the_required_form_and_pages_fit_a_termina
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_file_of_pages_has_a_page_for_each_rule_in_order_and_no_other_content(topic: str) -> None:
     assert list(topic_pages(topic)) == [rule.id for rule in TOPICS[topic]]
-    data = tomllib.loads(page_files()[topic].read_text("utf-8"))
+    data = tomllib.loads(page_file_by_topic()[topic].read_text("utf-8"))
     known = {field.name for field in fields(Page)} | {"parts"}
     assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {
         "correction",
@@ -103,8 +103,8 @@ def test_every_module_of_rules_has_a_file_of_pages() -> None:
     topics = {*TOPICS, "left_out"}
     assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == topics - {"parser"}
     assert {path.stem for path in HERE.glob("*.toml")} == topics - {"parser"}
-    assert all(file.is_file() for file in page_files().values())
-    assert page_files().keys() == topics
+    assert all(file.is_file() for file in page_file_by_topic().values())
+    assert page_file_by_topic().keys() == topics
     assert sum(map(len, TOPICS.values())) == len(URDF_RULES)
 
 

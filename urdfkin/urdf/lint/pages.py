@@ -71,7 +71,7 @@ def page(code: str) -> Page:
     return topic_pages(_TOPIC_OF_CODE[code])[code]
 
 
-def page_files() -> dict[str, Traversable]:
+def page_file_by_topic() -> dict[str, Traversable]:
     from importlib import resources
 
     packages = {
@@ -84,7 +84,7 @@ def page_files() -> dict[str, Traversable]:
 def topic_pages(topic: str) -> dict[str, Page]:
     import tomllib
 
-    data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
+    data = tomllib.loads(page_file_by_topic()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {
         code: _make_page({**data, **defaults, **data[code]})

@@ -41,11 +41,11 @@ from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 #: The number changes if a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
-Key = tuple[str, ...]
+BaselineKey = tuple[str, ...]
 _BASELINE_FIELDS = ("file", "code", "severity", "element", "name", "found")
 
 
-def baseline_key(finding: Finding, file: str) -> Key:
+def baseline_key(finding: Finding, file: str) -> BaselineKey:
     words = (finding.severity.value, finding.element or "", finding.name or "", finding.found or "")
     return (file, finding.code, *words)
 
@@ -59,7 +59,7 @@ class Baseline:
     found.
     """
 
-    counts: Counter[Key]
+    counts: Counter[BaselineKey]
     root: Path = field(default_factory=Path)
     match_count: int = 0
 
@@ -86,7 +86,7 @@ def relative_path(file: str, root: Path) -> str:
 
 def read_baseline(path: Path) -> Baseline:
     """Read a baseline; raise InputError if the file is not a baseline."""
-    counts = Counter[Key]()
+    counts = Counter[BaselineKey]()
     try:
         document = json.loads(read_text(path))
         if document["schema"] != "urdfkin-baseline" or document["version"] != BASELINE_VERSION:

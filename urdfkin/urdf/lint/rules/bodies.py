@@ -54,12 +54,12 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
         message = "<inertial> is incomplete"
         remedy = "write <mass> and all six moments of <inertia>, or remove <inertial>"
         report.add(INERTIAL_INCOMPLETE, message, inertial, found=f"no {', '.join(missing)}", remedy=remedy)
-    lever = None
+    centre_of_mass = None
     if origin is not None:
-        lever = numbers.read_vector(origin, "xyz")
+        centre_of_mass = numbers.read_vector(origin, "xyz")
         numbers.read_vector(origin, "rpy")
     mass = None if mass_element is None else numbers.read_scalar(mass_element, "value")
-    _check_mass(report, inertial, mass, lever)
+    _check_mass(report, inertial, mass, centre_of_mass)
     if tensor is not None:
         read = (numbers.read_scalar(tensor, name) for name in _INERTIA_ATTRIBUTES)
         moments = [moment for moment in read if moment is not None]
@@ -68,7 +68,7 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
 
 
 def _check_mass(
-    report: Reporter, inertial: Element, mass: float | None, lever: tuple[float, ...] | None
+    report: Reporter, inertial: Element, mass: float | None, centre_of_mass: tuple[float, ...] | None
 ) -> None:
     if mass is not None and mass < 0.0:
         report.add(
@@ -81,7 +81,7 @@ def _check_mass(
             weight=1.0,
         )
     heavy = mass is not None and abs(mass) > MAX_MASS
-    distance = max(map(abs, lever or (0.0,)))
+    distance = max(map(abs, centre_of_mass or (0.0,)))
     if heavy or distance > MAX_COORDINATE:
         message = "the mass or the centre of mass is far too large"
         remedy = "write the mass in kilograms and the centre of mass in metres"
@@ -262,7 +262,7 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
             folder = packages[package]
             if folder is None:
                 missing.setdefault(package, []).append(mesh)
-            elif not _exists(folder / path):
+            elif not _is_existing_file(folder / path):
                 _report_missing_mesh(report, mesh, filename)
         elif _is_missing_file(filename, urdf_path):
             _report_missing_mesh(report, mesh, filename)
@@ -300,10 +300,10 @@ def _is_missing_file(filename: str, urdf_path: Path | None) -> bool:
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if urdf_path is None or not local:
         return False
-    return not _exists(urdf_path.absolute().parent / filename.removeprefix("file://"))
+    return not _is_existing_file(urdf_path.absolute().parent / filename.removeprefix("file://"))
 
 
-def _exists(path: Path) -> bool:
+def _is_existing_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):

@@ -101,11 +101,14 @@ _ElementOrAttribute = tuple[Element, str | None]
 
 
 def _report_xacro(
-    report: Reporter, what: str, places: Sequence[_ElementOrAttribute], is_used: Callable[[Element], bool]
+    report: Reporter,
+    what: str,
+    places: Sequence[_ElementOrAttribute],
+    affects_kinematics: Callable[[Element], bool],
 ) -> bool:
     """Report unexpanded xacro in `places`; return whether kinematics uses any element of `places`."""
-    used = [place for place in places if is_used(place[0])]
-    unused = [place for place in places if not is_used(place[0])]
+    used = [place for place in places if affects_kinematics(place[0])]
+    unused = [place for place in places if not affects_kinematics(place[0])]
     for group, severity, message in (
         (used, None, f"unexpanded {what}"),
         (unused, Severity.WARNING, f"unexpanded {what}, which kinematics does not use"),
@@ -230,7 +233,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
             what = f"a {meant} inside <{part.parent.tag if part.parent else ''}>"
         message = f"{what} is skipped, so the element is missing from the robot"
         remedy = f"write <{meant}> as a child of <robot>"
-        report.add(MISPLACED, message, part, remedy=remedy, misplaced=True)
+        report.add(MISPLACED, message, part, remedy=remedy, names_element=True)
     if parts:
         return
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
@@ -474,29 +477,37 @@ _COMMENT_PATTERN = re.compile(r"\s*urdfkin:\s*ignore\s*\[([^\]]*)\]\s*(.*)", re.
 _CODE_SEPARATOR = re.compile(r"[,\s]+")
 
 
-def apply_comments(report: Reporter, codes: Mapping[str, str]) -> None:
+def apply_comments(report: Reporter, code_by_name: Mapping[str, str]) -> None:
     """Apply the comments that silence findings, and report invalid comments."""
     comment_index = CommentIndex()
     for comment in report.comments:
-        if (ignore := _read_comment(report, comment, codes)) is not None:
+        if (ignore := _read_comment(report, comment, code_by_name)) is not None:
             comment_index.add(ignore)
     report.silence(comment_index)
 
 
-def _read_comment(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> IgnoreComment | None:
+def _read_comment(
+    report: Reporter, comment: Comment, code_by_name: Mapping[str, str]
+) -> IgnoreComment | None:
     match = _COMMENT_PATTERN.fullmatch(comment.text)
     words = [word for word in _CODE_SEPARATOR.split(match[1]) if word] if match else []
-    unknown = next((word for word in words if word.lower() not in codes), None)
+    unknown = next((word for word in words if word.lower() not in code_by_name), None)
     reason = " ".join(match[2].split()) if match else ""
     remedy: str | None
     if words and unknown is None and reason:
-        return IgnoreComment(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
+        return IgnoreComment(
+            comment, tuple(dict.fromkeys(code_by_name[word.lower()] for word in words)), reason
+        )
     if not words:
         what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] the reason -->"
     elif unknown is not None:
-        close = report.nearest(unknown.lower(), codes)
+        close = report.find_nearest_names(unknown.lower(), code_by_name)
         what = f"unknown code {quote(unknown)}"
-        remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
+        remedy = (
+            f"did you mean {', '.join(dict.fromkeys(code_by_name[word] for word in close))}?"
+            if close
+            else None
+        )
     else:
         what, remedy = "no reason is given", "write the reason after the bracket"
     message = f"{what}, so the comment silences nothing"

@@ -47,7 +47,7 @@ def check_structure(report: Reporter, robot: RobotRecord) -> bool:
 def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
-            nearest = ", ".join(report.nearest(link, robot.links))
+            nearest = ", ".join(report.find_nearest_names(link, robot.links))
             message, at = f"the {tag} link does not exist", joint.element.find(tag)
             remedy = f"did you mean {nearest}?" if nearest else f"add <link name={quote(link)}/>"
             report.add(UNKNOWN_LINK, message, at, attribute="link", found=quote(link), remedy=remedy)
@@ -393,7 +393,7 @@ class _MimicChecker:
 
     def report_unknown(self, joint: JointRecord, mimic: MimicRecord) -> None:
         others = (name for name in self.joints if name != joint.name)
-        nearest = self.report.nearest(mimic.mimicked_joint, others)
+        nearest = self.report.find_nearest_names(mimic.mimicked_joint, others)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
