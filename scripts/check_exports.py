@@ -42,7 +42,7 @@ from urdfkin.export import DEFAULT_QUANTITIES, LANGUAGES, code_for_language, wri
 from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import make_robot_code
 from urdfkin.robot import Robot
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import example_robot_data_names
 
 PAGE = DOCS / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
@@ -99,7 +99,7 @@ def _largest_ratio(found: Sequence[float], count: int) -> float:
 
 def leaf_frames(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield the tip frames, then the other leaves."""
-    robots = {name: urdfkin.load(name) for name in example_robots()}
+    robots = {name: urdfkin.load(name) for name in example_robot_data_names()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
     frames = [
@@ -131,7 +131,7 @@ def check_leaves(tips: bool, keep: Path | None, languages: Collection[str]) -> i
     for line in wrong:
         print("WRONG", line)
     checked_frames = {(line["robot"], line["frame"]) for line in lines}
-    trees = {name: urdfkin.load(name).tree for name in example_robots()}
+    trees = {name: urdfkin.load(name).tree for name in example_robot_data_names()}
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
     counts = f"{len(checked_frames & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
     others = f"{len(checked_frames - leaves)} tips that are not leaves"

@@ -40,7 +40,7 @@ from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.configuration import coordinate_names, sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
@@ -230,7 +230,7 @@ class Case:
 
 
 def make_cases(leaves: bool) -> Iterator[Case]:
-    for name in example_robots():
+    for name in example_robot_data_names():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]
         for tip in tips:

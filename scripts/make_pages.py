@@ -33,7 +33,7 @@ from urdfkin.system.documents import as_json_data
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, shorten
 from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, check
-from urdfkin.urdf.lint.pages import RULES
+from urdfkin.urdf.lint.pages import URDF_RULES
 from urdfkin.urdf.lint.pages import page as page_of
 from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, accuracy_study
 from urdfkin.validation.document import VALIDATION
@@ -95,7 +95,7 @@ def make_findings_parts() -> dict[str, str]:
                 _escape(shorten(page_of(rule.id).title, 200)),
                 f"*{rule.pinocchio_reading.value}*" if rule.pinocchio_reading else "",
             )
-            for rule in RULES.values()
+            for rule in URDF_RULES.values()
             if rule.id[4] == digit
         ]
         heads = ("code", "name", "severity", "finding", "Pinocchio")

@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunking, run_chunk
 from urdfkin.validation.cluster import connect_cluster
@@ -109,5 +109,5 @@ if __name__ == "__main__":
     if options.chunk:
         measure_chunk()
     else:
-        robots = list(example_robots()) if options.all else options.robots
+        robots = list(example_robot_data_names()) if options.all else options.robots
         measure(robots, options.engines.split(","), options.samples, options.rounds)

@@ -62,7 +62,7 @@ def test_a_number_outside_the_bound_fails_the_run_in_a_library(
 
 
 def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check_exports, "example_robots", lambda: ("hyq", "ur5"))
+    monkeypatch.setattr(check_exports, "example_robot_data_names", lambda: ("hyq", "ur5"))
     names = [(name, frame) for name, _, frame in check_exports.leaf_frames(tips=False)]
     tips = [(name, frame) for name, _, frame in check_exports.leaf_frames(tips=True)]
     robots = {name: urdfkin.load(name) for name in ("hyq", "ur5")}

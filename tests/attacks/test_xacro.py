@@ -27,7 +27,7 @@ def expanded(tmp_path: Path) -> Expand:
         path = tmp_path / "robot" / "urdf" / "r.xacro"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f'<robot name="r" {NAMESPACE}>{inside}</robot>')
-        return expand(path, arguments, patience=patience).decode()
+        return expand(path, arguments, timeout=patience).decode()
 
     return expanded
 
@@ -301,7 +301,7 @@ def test_the_time_and_the_output_of_an_expansion_are_limited(
         expanded(link("${max(python.range(10**12))}"), patience=2.0)
     with pytest.raises(XacroError, match="recursion"):
         expanded('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>')
-    monkeypatch.setattr("urdfkin.urdf.xacro.MOST", 10_000)
+    monkeypatch.setattr("urdfkin.urdf.xacro.MAX_EXPANDED_BYTES", 10_000)
     with pytest.raises(XacroError, match="URDF is too long: found more than 10000 bytes"):
         expanded(link("${'x' * 20000}"))
 

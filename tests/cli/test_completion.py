@@ -20,7 +20,7 @@ from urdfkin.cli import commands
 from urdfkin.dh.parse_table import published_tables
 from urdfkin.kinematics.registry import equations
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.lint.pages import RULES
+from urdfkin.urdf.lint.pages import URDF_RULES
 
 Offered = Callable[[str], list[str]]
 
@@ -47,10 +47,10 @@ def test_commands_options_choices_codes_equations_and_tables_are_completed(offer
     assert offered("jaco") == ["jacobian", "jacobian-rate"]
     assert offered("jacobian panda --refe") == ["--reference"]
     assert offered("jacobian panda --reference lo") == ["local", "local_world_aligned"]
-    slugs = {rule.slug for rule in RULES.values()}
-    assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
+    slugs = {rule.slug for rule in URDF_RULES.values()}
+    assert set(offered("explain ")) == {*URDF_RULES, *slugs, *equations()}
     assert offered("explain 7.13") == ["7.13", "7.130"]
-    assert set(offered("check --ignore ")) == {*RULES, *slugs}
+    assert set(offered("check --ignore ")) == {*URDF_RULES, *slugs}
     assert set(offered("dh ur5 --compare ")) == {"file", *published_tables()}
     assert offered("check ") == ["file"]
     assert offered("nonsense x") == []

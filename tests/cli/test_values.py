@@ -132,7 +132,11 @@ def test_the_catalogue_folds_no_name_and_is_no_wider_than_the_terminal(columns: 
     assert max(map(len, table)) <= max(columns, 71)  # the width of family, base and tip
     words = {word for line in table for word in line.split()}
     for entry in catalogue().values():
-        assert {entry.name, *entry.family.split(), *filter(None, (entry.base, entry.tip))} <= words
+        assert {
+            entry.name,
+            *entry.family.split(),
+            *filter(None, (entry.base_frame, entry.tip_frame)),
+        } <= words
 
 
 def test_the_json_result_contains_robot_frame_names_inputs_and_check() -> None:

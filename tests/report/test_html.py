@@ -18,7 +18,7 @@ from urdfkin.report.figures import distributions
 from urdfkin.report.html import as_html
 from urdfkin.report.pages import angle
 from urdfkin.report.words import VERDICTS
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
 
@@ -112,7 +112,7 @@ def test_equal_documents_give_equal_pages_and_a_robot_adds_at_most_140_kilobytes
 
 @pytest.mark.long
 def test_the_page_of_all_68_robots_is_at_most_10_megabytes() -> None:
-    document = validate(example_robots(), samples=0).as_dict()
+    document = validate(example_robot_data_names(), samples=0).as_dict()
     assert len(document["robots"]) == 68
     text = as_html(document)
     assert 3_000_000 < len(text.encode()) <= 10_000_000

@@ -20,7 +20,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.system.resources import example_robots_dir
-from urdfkin.urdf.catalogue import catalogue, example_robots
+from urdfkin.urdf.catalogue import catalogue, example_robot_data_names
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.verify.quantities import QUANTITIES
 
@@ -29,12 +29,19 @@ from urdfkin.verify.quantities import QUANTITIES
 WITHOUT_MIMIC_MODEL = frozenset({"alex_psyonic_hands", "romeo", "talos", "talos_box"})
 
 #: The first robot of each family, an arm with a mimic joint, and a humanoid; the tests of others are slow.
-QUICK = {"panda", "talos", *{catalogue()[name].family: name for name in reversed(example_robots())}.values()}
+QUICK = {
+    "panda",
+    "talos",
+    *{catalogue()[name].family: name for name in reversed(example_robot_data_names())}.values(),
+}
 
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in example_robots()],
+    params=[
+        pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+        for name in example_robot_data_names()
+    ],
 )
 def robot(request: pytest.FixtureRequest) -> Robot:
     return urdfkin.load(request.param)
@@ -42,7 +49,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 def test_the_catalogue_contains_every_valid_urdf_of_example_robot_data() -> None:
     shipped = {path.relative_to(example_robots_dir()) for path in example_robots_dir().rglob("*.urdf")}
-    listed = [catalogue()[name].relative_path for name in example_robots()]
+    listed = [catalogue()[name].relative_path for name in example_robot_data_names()]
     assert len(listed) == len(set(listed)) == 68
     assert {path.name for path in shipped - set(listed)} == {"ur3.urdf"}
 

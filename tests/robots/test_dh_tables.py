@@ -16,12 +16,12 @@ from urdfkin.dh.parse_table import published_tables, reference_path
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.robot.loading import load
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import example_robot_data_names
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-@pytest.mark.parametrize("name", example_robots())
+@pytest.mark.parametrize("name", example_robot_data_names())
 def test_the_table_of_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(
     name: str, convention: str
 ) -> None:

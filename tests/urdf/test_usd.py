@@ -887,7 +887,7 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
 ) -> None:
     path = write(stage(ARM, unit=0.5))
     assert loaded_in_this_process(monkeypatch, path).nq == 2
-    side, motion = usd._StageReader._read_side, usd._StageReader._read_motion
+    side, motion = usd._StageReader._read_joint_frame, usd._StageReader._read_motion
 
     def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
         found = present(side(self, prim, 1 - i if mistake == "swapped" else i, target))
@@ -900,7 +900,7 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
         factor = 180.0 / math.pi if mistake == "degrees" else 1.0
         return kind, axis, (lower * factor, upper * factor), "rotX" if mistake == "axis" else free
 
-    monkeypatch.setattr(usd._StageReader, "_read_side", wrong_side)
+    monkeypatch.setattr(usd._StageReader, "_read_joint_frame", wrong_side)
     monkeypatch.setattr(usd._StageReader, "_read_motion", wrong_motion)
     with pytest.raises(OracleError, match="parser of UsdPhysics and urdfkin disagree about this joint"):
         loaded_in_this_process(monkeypatch, path)

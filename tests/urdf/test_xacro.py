@@ -97,7 +97,7 @@ def test_an_endless_expansion_ends_with_an_error(write: Write) -> None:
     endless = '<xacro:property name="x" value="${9**9**9**9}"/><link name="${x}"/>'
     path = write(f'<robot name="r" {NAMESPACE}>{endless}</robot>', "r.xacro")
     with pytest.raises(XacroError, match="did not finish"):
-        expand(path, {}, patience=3.0)
+        expand(path, {}, timeout=3.0)
 
 
 def test_mistakes_with_xacro_are_errors_with_a_remedy(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.findings import Reporter, Severity
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.records import JointRecord, Vector
-from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion
+from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion_before_element
 from urdfkin.verify.certificate import Certificate
 
 #: Number of decimals of written metres and radians: the precision of a double near 1.
@@ -65,7 +65,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
         return list(make_attribute_edits(data, joint.origin_element, values))
     written = " ".join(f'{name}="{value}"' for name, value in values.items())
     # A valid <joint> element contains at least the elements <parent> and <child>.
-    return [make_insertion(data, joint.element.children[0], f"<origin {written}/>")]
+    return [make_insertion_before_element(data, joint.element.children[0], f"<origin {written}/>")]
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:

@@ -37,7 +37,7 @@ from urdfkin.urdf.findings import ExcerptFormatter, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Severity, SizeLimits
 from urdfkin.urdf.lint.autofix import fix_text, make_patch
 from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, format_statistics, format_summary
-from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, RULES, page
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, URDF_RULES, page
 from urdfkin.urdf.lint.runner import Examination, examine, find_local_path
 from urdfkin.urdf.lint.settings import (
     DEFAULT_INCLUDE,
@@ -163,7 +163,7 @@ def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
         more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
         where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
         effect = f"; each joint rotated by at most {turns:.1e} rad" if turns else "; the robot is unchanged"
-        say(f"{file}: fixed {code} {RULES[code].slug}, {where}{effect}", err=True)
+        say(f"{file}: fixed {code} {URDF_RULES[code].slug}, {where}{effect}", err=True)
 
 
 _SETTINGS_KEY = "urdfkin.settings"
@@ -361,7 +361,7 @@ def _make_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
         mimic=how["mimic"],
         root_joint=how["root_joint"],
     )
-    codes_ = (_read_codes(options, "select") or frozenset(RULES | MJCF_AND_USD_RULES)) - _read_codes(
+    codes_ = (_read_codes(options, "select") or frozenset(URDF_RULES | MJCF_AND_USD_RULES)) - _read_codes(
         options, "ignore"
     )
     return CheckRun(

@@ -14,7 +14,7 @@ from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
 from urdfkin.urdf.findings import Rule, shorten
-from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, PROSE_WIDTH, RULES, explain, find_rule, page
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, PROSE_WIDTH, URDF_RULES, explain, find_rule, page
 
 _LINK = re.compile(r"\[([^\]]+)\]\([^)\s]+\)")
 _CODE_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -97,7 +97,7 @@ def explain_command(topic: str | None) -> None:
       urdfkin explain reference-frames
       urdfkin explain jacobian
     """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
-    rules = (*RULES.values(), *MJCF_AND_USD_RULES.values())
+    rules = (*URDF_RULES.values(), *MJCF_AND_USD_RULES.values())
     if topic is None:
         for rule in rules:
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
@@ -136,7 +136,7 @@ def _list_matches(topic: str) -> list[str]:
     words = topic.lower().split()
     if not any(map(str.isalpha, topic)):
         return []
-    rules = [(rule.id, page(rule.id).title) for rule in (*RULES.values(), *MJCF_AND_USD_RULES.values())]
+    rules = [(rule.id, page(rule.id).title) for rule in (*URDF_RULES.values(), *MJCF_AND_USD_RULES.values())]
     entries = [*rules, *((number, equation.meaning) for number, equation in equations().items())]
     return [f"{name:7}  {text}" for name, text in entries if all(word in text.lower() for word in words)]
 

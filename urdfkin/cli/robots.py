@@ -41,7 +41,7 @@ def robots_command(family: str | None) -> Answer:
     if not entries:
         raise click.UsageError(f"no robots of family {family!r}; the families are: {', '.join(_FAMILIES)}")
     heads = ("name", "family", "base", "tip")
-    rows = [(entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries]
+    rows = [(entry.name, entry.family, entry.base_frame or "", entry.tip_frame or "") for entry in entries]
     without_mimic = [
         f"{entry.name}: mimic joints are loaded as free joints: {entry.mimic_problem}"
         for entry in entries

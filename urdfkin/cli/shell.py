@@ -56,9 +56,9 @@ def complete_table(_context: click.Context, _parameter: click.Parameter, incompl
 
 
 def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    from urdfkin.urdf.lint.pages import RULES
+    from urdfkin.urdf.lint.pages import URDF_RULES
 
-    return _items((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
+    return _items((name for rule in URDF_RULES.values() for name in (rule.id, rule.slug)), incomplete)
 
 
 def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:

@@ -29,7 +29,7 @@ from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.files import is_folder
 from urdfkin.system.lazy_import import install_command
-from urdfkin.urdf.catalogue import catalogue, example_robots
+from urdfkin.urdf.catalogue import catalogue, example_robot_data_names
 from urdfkin.verify.quantities import compared_titles, uncompared_titles
 
 if TYPE_CHECKING:
@@ -248,7 +248,9 @@ def validate_command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
-    sources = [source for robot in robots for source in _list_urdf_files(robot)] or list(example_robots())
+    sources = [source for robot in robots for source in _list_urdf_files(robot)] or list(
+        example_robot_data_names()
+    )
     given = [_load_stdin(robot, how) if with_study else robot for robot in sources]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (

@@ -392,8 +392,8 @@ def make_robot(
         findings=findings,
         unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced_findings))),
         oracle=oracle,
-        base_frame=text.entry.base if text.entry else None,
-        tip_frame=text.entry.tip if text.entry else None,
+        base_frame=text.entry.base_frame if text.entry else None,
+        tip_frame=text.entry.tip_frame if text.entry else None,
     )
     is_plain = isinstance(lock, str | Mapping) and not lock and joints is None
     return robot if is_plain else robot.with_locked_joints(lock, joints)

@@ -63,11 +63,11 @@ class CatalogueEntry:
         return (robots_dir() if self.is_bundled else example_robots_dir()) / self.relative_path
 
     @property
-    def base(self) -> str | None:
+    def base_frame(self) -> str | None:
         return next((base for base, _ in self.limbs.values()), None)
 
     @property
-    def tip(self) -> str | None:
+    def tip_frame(self) -> str | None:
         return next((tip for _, tip in self.limbs.values()), None)
 
 
@@ -98,7 +98,7 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 
-def example_robots() -> tuple[str, ...]:
+def example_robot_data_names() -> tuple[str, ...]:
     return tuple(name for name, entry in catalogue().items() if not entry.is_bundled)
 
 

@@ -23,9 +23,9 @@ from urdfkin.urdf.xacro import find_arguments
 _FORBIDDEN_SYMBOLS = ("type", "vars")
 
 #: Test expression that xacro alone evaluates, and urdfkin refuses.
-_PROBE = "${(lambda: 1)()}"
+_TEST_EXPRESSION = "${(lambda: 1)()}"
 
-_TOO_MUCH = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH_MEMORY = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
@@ -38,7 +38,7 @@ def serve() -> None:
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], allowed_paths)
     except MemoryError:
-        answer = {"error": _TOO_MUCH}
+        answer = {"error": _TOO_MUCH_MEMORY}
     except (Exception, SystemExit) as error:
         answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
@@ -47,20 +47,22 @@ def serve() -> None:
 
 
 def _expand(
-    path: Path, arguments: dict[str, str], search: Mapping[str, str], allowed_paths: AllowedPaths
+    path: Path, arguments: dict[str, str], search_paths: Mapping[str, str], allowed_paths: AllowedPaths
 ) -> dict[str, Any]:
     import xacrodoc
 
-    _replace_evaluation(path, search, allowed_paths)
+    _replace_evaluation(path, search_paths, allowed_paths)
     importlib.import_module("xml.dom.expatbuilder")  # After `confine`, xacro cannot import this module.
     confine(allowed_paths.allows)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
-    declared = find_arguments(path, _make_package_finder(path, search, allowed_paths)) if arguments else None
+    declared = (
+        find_arguments(path, _make_package_finder(path, search_paths, allowed_paths)) if arguments else None
+    )
     return {"urdf": urdf, "arguments": None if declared is None else sorted(declared)}
 
 
-def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: AllowedPaths) -> None:
+def _replace_evaluation(path: Path, search_paths: Mapping[str, str], allowed_paths: AllowedPaths) -> None:
     """Make xacro call urdfkin's functions to evaluate expressions and to find packages.
 
     Raise RefusedError if xacro still evaluates expressions itself.
@@ -75,23 +77,23 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: Al
     namespaces = [dict(symbols), *(value for value in symbols.values() if isinstance(value, dict))]
     functions = [value for names in namespaces for value in dict.values(names) if callable(value)]
 
-    def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
+    def evaluate_expression(expression: str, names: Mapping[str, Any], local: object = None) -> object:
         try:
             return evaluate(expression, names, functions)
         except MemoryError:  # A MemoryError has no message.
-            raise RefusedError(_TOO_MUCH) from None
+            raise RefusedError(_TOO_MUCH_MEMORY) from None
 
-    def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:
+    def evaluate_substitution(expression: str, context: Mapping[str, Any]) -> str:
         names = {
             name: substitution_args.convert_value(x, "auto") for name, x in context.get("arg", {}).items()
         }
         return str(evaluate(expression, {**symbols, "true": True, "false": False, **names}, functions))
 
-    xacro.safe_eval = value_of
-    substitution_args._eval = value_of_arguments  # This function evaluates `$(eval ...)`.
-    xacrodoc.packages.get_path = _make_package_finder(path, search, allowed_paths)
+    xacro.safe_eval = evaluate_expression
+    substitution_args._eval = evaluate_substitution  # This function evaluates `$(eval ...)`.
+    xacrodoc.packages.get_path = _make_package_finder(path, search_paths, allowed_paths)
     try:
-        xacro.eval_text(_PROBE, symbols)
+        xacro.eval_text(_TEST_EXPRESSION, symbols)
     except xacro.XacroException as error:
         if isinstance(error.exc, RefusedError):
             return
@@ -99,21 +101,21 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: Al
 
 
 def _make_package_finder(
-    path: Path, search: Mapping[str, str], allowed_paths: AllowedPaths
+    path: Path, search_paths: Mapping[str, str], allowed_paths: AllowedPaths
 ) -> Callable[[str], str]:
-    def is_package(folder: Path) -> bool:
+    def is_allowed_or_package(folder: Path) -> bool:
         """Return whether a folder is allowed or contains a package.xml.
 
         For example, `$(find etc)` does not find /etc.
         """
         return allowed_paths.allows(str(folder)) or (folder / "package.xml").is_file()
 
-    def get_path(name: str) -> str:
-        folder = find_package(name, path, search, is_package)
+    def find_package_folder(name: str) -> str:
+        folder = find_package(name, path, search_paths, is_allowed_or_package)
         if folder is None:
             raise LookupError(f"package {name!r} is not found")
         if not allowed_paths.allows(str(folder)):
             allowed_paths.roots.append(str(folder.resolve()))
         return str(folder)
 
-    return get_path
+    return find_package_folder

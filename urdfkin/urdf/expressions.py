@@ -52,7 +52,7 @@ _METHODS: dict[type, str] = {
     dict: "copy get items keys pop setdefault update values",
     float: "is_integer",
 }
-_CONTAINERS = (str, list, tuple, dict, range)
+_INDEXABLE_TYPES = (str, list, tuple, dict, range)
 
 
 class RefusedError(Exception):
@@ -106,7 +106,7 @@ class _Evaluation:
 
     def Subscript(self, node: ast.Subscript) -> Any:
         owner = self.value(node.value)
-        if not isinstance(owner, _CONTAINERS):
+        if not isinstance(owner, _INDEXABLE_TYPES):
             raise RefusedError(f"expressions may not index a {type(owner).__name__!r}")
         return owner[self.value(node.slice)]
 

@@ -47,7 +47,7 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
 #: In such a line, at most `MAX_EXCERPT_LEAD` characters precede the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
-_TAB = "    "
+_TAB_SPACES = "    "
 
 
 class ExcerptFormatter:
@@ -80,7 +80,7 @@ class ExcerptFormatter:
         last = first + MAX_EXCERPT_LENGTH
         end = min(start + finding.width, last)
         pieces = self.text[first:start], self.text[start:end], self.text[end:last]
-        before, marked, after = (escape_unprintable(piece.replace("\t", _TAB)) for piece in pieces)
+        before, marked, after = (escape_unprintable(piece.replace("\t", _TAB_SPACES)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
         caret = " " * (_display_width(lead) + _display_width(before)) + "^" * max(_display_width(marked), 1)
@@ -388,7 +388,7 @@ class IgnoreComment:
 class CommentIndex:
     comments: list[IgnoreComment] = field(default_factory=list)
     #: First comment for each key: ("line", number, code), ("element", id, code) or ("file", 0, code).
-    _first: dict[tuple[str, int, str], IgnoreComment] = field(default_factory=dict)
+    _comment_by_key: dict[tuple[str, int, str], IgnoreComment] = field(default_factory=dict)
 
     def add(self, ignore: IgnoreComment) -> None:
         self.comments.append(ignore)
@@ -402,7 +402,7 @@ class CommentIndex:
         else:
             place = "element", id(comment.element)
         for code in ignore.codes:
-            self._first.setdefault((*place, code), ignore)
+            self._comment_by_key.setdefault((*place, code), ignore)
 
     def find_reason(self, code: str, line: int, element: Element | None) -> str | None:
         """Return the reason of the nearest comment that silences a finding, or None."""
@@ -411,14 +411,14 @@ class CommentIndex:
             places.append(("element", id(element)))
             element = element.parent
         for place in (*places, ("file", 0)):
-            if (ignore := self._first.get((*place, code))) is not None:
+            if (ignore := self._comment_by_key.get((*place, code))) is not None:
                 ignore.used_codes.add(code)
                 return ignore.reason
         return None
 
 
 #: Maximum number of misspelt names in a file that get suggestions.
-MAX_SEARCHES = 20
+MAX_NAME_SEARCHES = 20
 #: Limits of one search for similar names:
 #: number of names, and number of compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
@@ -442,12 +442,13 @@ class _FindingGroup:
     """Findings of one code and severity.
 
     Attributes:
-        pairs: At most `MAX_COMPLETE_FINDINGS` pairs: a finding, and the `weight` passed to `Reporter.add`.
+        weighted_findings: At most `MAX_COMPLETE_FINDINGS` pairs: a finding, and the `weight` passed to
+            `Reporter.add`.
         further_lines: Line numbers of all further findings.
     """
 
     severity: Severity
-    pairs: list[tuple[Finding, float]] = field(default_factory=list)
+    weighted_findings: list[tuple[Finding, float]] = field(default_factory=list)
     further_lines: array[int] = field(default_factory=lambda: array("q"))
 
 
@@ -459,8 +460,8 @@ class Reporter:
     comments: list[Comment] = field(default_factory=list)
     silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
     comment_index: CommentIndex = field(default_factory=CommentIndex)
-    _searches: int = 0
-    _raw_blanks: bool | None = None
+    _name_search_count: int = 0
+    _replaced_characters: bool | None = None
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
     _element: Element | None = None
     _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
@@ -474,7 +475,7 @@ class Reporter:
         attribute: str | None = None,
         found: str | None = None,
         remedy: str | None = None,
-        misplaced: bool = False,
+        names_element: bool = False,
         severity: Severity | None = None,
         position: tuple[int, int] = (1, 1),
         weight: float = 0.0,
@@ -482,7 +483,7 @@ class Reporter:
     ) -> None:
         """Add a finding about an element, or about the line and column `position`.
 
-        The finding names the child of `<robot>` that contains the element. If `misplaced` is True, the
+        The finding names the child of `<robot>` that contains the element. If `names_element` is True, the
         finding names `element` instead of this child. If several warnings or notes are combined into one
         finding, the finding with the greatest `weight` represents the others.
         """
@@ -494,7 +495,10 @@ class Reporter:
             start = position[0] if element is None else self._locate(element, attribute)[0]
             reason = self.comment_index.find_reason(rule.id, start, element)
         group = self._groups.setdefault((rule.id, severity), _FindingGroup(severity))
-        if len(group.pairs if reason is None else self.silenced_findings) >= MAX_COMPLETE_FINDINGS:
+        if (
+            len(group.weighted_findings if reason is None else self.silenced_findings)
+            >= MAX_COMPLETE_FINDINGS
+        ):
             if reason is None:
                 group.further_lines.append(position[0] if element is None else element.line)
             return
@@ -502,14 +506,14 @@ class Reporter:
         tag, name = None, None
         if element is not None:
             line, column, width = self._locate(element, attribute)
-            subject = element if misplaced else element.top_element
+            subject = element if names_element else element.top_level_element
             tag, name = subject.tag, subject.attributes.get("name") if element.parent is not None else None
         finding = Finding(
             rule.id, severity, message, found, remedy, self.file, line, column, tag, name,
             rule.pinocchio_reading, width=width, fix=None if fix is None or reason is not None else fix(),
         )  # fmt: skip
         if reason is None:
-            group.pairs.append((finding, weight))
+            group.weighted_findings.append((finding, weight))
         else:
             self.silenced_findings.append((finding, reason))
 
@@ -522,23 +526,24 @@ class Reporter:
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
                 reasons = [
-                    (pair, comment_index.find_reason(code, pair[0].line, None)) for pair in group.pairs
+                    (pair, comment_index.find_reason(code, pair[0].line, None))
+                    for pair in group.weighted_findings
                 ]
                 self.silenced_findings += [
                     (finding, reason) for (finding, _), reason in reasons if reason is not None
                 ]
-                group.pairs = [pair for pair, reason in reasons if reason is None]
+                group.weighted_findings = [pair for pair, reason in reasons if reason is None]
 
-    def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three similar names, or [] after `MAX_SEARCHES` calls."""
-        self._searches += 1
-        if self._searches > MAX_SEARCHES:
+    def find_nearest_names(self, word: str, known: Iterable[str]) -> list[str]:
+        """Return up to three similar names, or [] after `MAX_NAME_SEARCHES` calls."""
+        self._name_search_count += 1
+        if self._name_search_count > MAX_NAME_SEARCHES:
             return []
         return find_similar_names(word, islice(known, MAX_CANDIDATES), work=MAX_COMPARED_PAIRS)
 
     def is_full(self, rule: Rule) -> bool:
         group = self._groups.get((rule.id, rule.severity))
-        return group is not None and len(group.pairs) >= MAX_COMPLETE_FINDINGS
+        return group is not None and len(group.weighted_findings) >= MAX_COMPLETE_FINDINGS
 
     @property
     def has_errors(self) -> bool:
@@ -549,30 +554,30 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings, sorted by line; omit findings for which `is_reported` returns False.
 
-        `is_reported` is called once for each finding in `_FindingGroup.pairs`, in file order.
+        `is_reported` is called once for each finding in `_FindingGroup.weighted_findings`, in file order.
         """
-        pairs = [pair for group in self._groups.values() for pair in group.pairs]
+        pairs = [pair for group in self._groups.values() for pair in group.weighted_findings]
         if is_reported is not None:
             pairs.sort(key=lambda pair: _sort_key(pair[0]))
             pairs = [pair for pair in pairs if is_reported(pair[0])]
         reported = {id(pair) for pair in pairs}
         findings: list[Finding] = []
         for group in self._groups.values():
-            if pairs_of_group := [pair for pair in group.pairs if id(pair) in reported]:
+            if pairs_of_group := [pair for pair in group.weighted_findings if id(pair) in reported]:
                 findings += _combine(
                     _FindingGroup(group.severity, pairs_of_group, group.further_lines), fold=fold
                 )
         return tuple(sorted(findings, key=_sort_key))
 
     @property
-    def has_raw_blanks(self) -> bool:
+    def has_replaced_characters(self) -> bool:
         """Whether an attribute value contains a tab, a line end or a reference such as `&amp;`.
 
         XML parsers replace these characters.
         """
-        if self._raw_blanks is None:
-            self._raw_blanks = _RAW_BLANK.search(self.data) is not None
-        return self._raw_blanks
+        if self._replaced_characters is None:
+            self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
+        return self._replaced_characters
 
     def raw_value(self, element: Element, attribute: str) -> str | None:
         """Return an attribute value as written in the file."""
@@ -616,7 +621,7 @@ class Reporter:
                 return None
             end = closed.end()
         start = start_of_blanks(self.data, element.offset, b" \t")
-        rest = _REST_OF_LINE.match(self.data, end)
+        rest = _BLANKS_TO_LINE_END.match(self.data, end)
         alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
         return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(element.offset, end),))
 
@@ -635,10 +640,10 @@ class _AttributeSpan:
 #: A reference is, for example, `&amp;`.
 #: XML parsers replace tabs, line ends and references in attribute values.
 #: Possessive quantifiers keep the matching time linear.
-_RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
+_REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")
-_REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
+_BLANKS_TO_LINE_END = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
 def _attributes(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:
@@ -669,18 +674,18 @@ def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
 
     In the last returned finding, `other_lines` has the line numbers of the findings that are not returned.
     """
-    group.pairs.sort(key=lambda pair: _sort_key(pair[0]))
-    findings = [finding for finding, _ in group.pairs]
+    group.weighted_findings.sort(key=lambda pair: _sort_key(pair[0]))
+    findings = [finding for finding, _ in group.weighted_findings]
     into_one = fold and group.severity is not Severity.ERROR
     if into_one and len(findings) >= (
         MIN_FOLDED_EXTRAS if findings[0].code.startswith("URDF7") else MIN_FOLDED
     ):
-        best = max(range(len(findings)), key=lambda i: group.pairs[i][1])
-        complete, rest = [findings.pop(best)], findings
+        best = max(range(len(findings)), key=lambda i: group.weighted_findings[i][1])
+        complete, not_returned = [findings.pop(best)], findings
     else:
-        most = MAX_ERRORS_PER_CODE if fold else len(findings)
-        complete, rest = findings[:most], findings[most:]
-    lines = sorted([*(finding.line for finding in rest), *group.further_lines])
+        max_complete = MAX_ERRORS_PER_CODE if fold else len(findings)
+        complete, not_returned = findings[:max_complete], findings[max_complete:]
+    lines = sorted([*(finding.line for finding in not_returned), *group.further_lines])
     if lines:
         complete[-1] = replace(complete[-1], other_lines=tuple(lines))
     return complete

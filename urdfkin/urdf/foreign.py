@@ -21,8 +21,8 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import SLIDE_LIMIT, make_fixed_joint, make_unique
-from urdfkin.urdf.parser import QUATERNION
+from urdfkin.urdf.mjcf import FALLBACK_PRISMATIC_LIMIT, make_fixed_joint, make_unique
+from urdfkin.urdf.parser import QUAT_XYZW
 from urdfkin.urdf.reader import find_root_link, make_joint_rows
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
 from urdfkin.urdf.writer import to_urdf
@@ -82,7 +82,7 @@ def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
         " the file gives the rotation by quat_xyzw"
     )
     remedy = "if the file contains quat_xyzw, load the file instead of the yourdfpy robot"
-    return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
+    return (Finding(QUAT_XYZW.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
 def convert_yourdfpy_robot(robot: yourdf.Robot) -> str:
@@ -138,7 +138,7 @@ def _serialize(root: Any) -> str:
 #: R is a revolute joint, and P is a prismatic joint.
 #: RUB is a revolute joint without limits.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
-_KINDS = {
+_KIND_BY_CLASS = {
     "R": JointKind.REVOLUTE,
     "RUB": JointKind.CONTINUOUS,
     "P": JointKind.PRISMATIC,
@@ -186,7 +186,7 @@ class _ModelReader:
         self.kinds = [str(frame.type) for frame in self.frames]
         self.used_link_names, self.used_joint_names = set[str](), set(map(str, model.names))
         self.placements = [np.array(frame.placement.homogeneous) for frame in self.frames]
-        self.bodies = dict(self._bodies_on_joints())
+        self.bodies = dict(self._find_bodies_at_joint_frames())
         joints = range(int(model.njoints))
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
@@ -197,7 +197,7 @@ class _ModelReader:
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
-    def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
+    def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
         """For each body whose frame is a joint frame, yield the index of the joint and of the body.
 
         The bodies are in reverse order. In a dictionary of the pairs, the first body of a joint therefore
@@ -264,7 +264,7 @@ class _ModelReader:
         joint, name = model.joints[j], str(model.names[j])
         class_name = str(joint.shortname())
         aligned = _ALIGNED_CLASS.fullmatch(class_name)
-        kind = _KINDS.get(aligned[1] if aligned else class_name)
+        kind = _KIND_BY_CLASS.get(aligned[1] if aligned else class_name)
         if kind is None:
             mimics = class_name.endswith("Mimic")
             raise InputError(
@@ -284,17 +284,20 @@ class _ModelReader:
         if not kind.has_axis:
             return Joint(name, kind, 0, T, axis)
         q, v = int(joint.idx_q), int(joint.idx_v)
-        speed, effort = (_finite(x[v]) for x in (model.upperVelocityLimit, model.upperEffortLimit))
+        speed, effort = (_convert_limit(x[v]) for x in (model.upperVelocityLimit, model.upperEffortLimit))
         lower, upper = -math.inf, math.inf
         if kind is not JointKind.CONTINUOUS:
-            lower, upper = _finite(model.lowerPositionLimit[q]), _finite(model.upperPositionLimit[q])
+            lower, upper = (
+                _convert_limit(model.lowerPositionLimit[q]),
+                _convert_limit(model.upperPositionLimit[q]),
+            )
         if math.isinf(lower) or math.isinf(upper):
             if kind.turns:
                 kind = JointKind.CONTINUOUS
             else:
-                lower, upper = max(lower, -SLIDE_LIMIT), min(upper, SLIDE_LIMIT)
+                lower, upper = max(lower, -FALLBACK_PRISMATIC_LIMIT), min(upper, FALLBACK_PRISMATIC_LIMIT)
         return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
 
 
-def _finite(value: float) -> float:
+def _convert_limit(value: float) -> float:
     return math.copysign(math.inf, value) if abs(value) > _INFINITE_LIMIT else float(value)

@@ -45,7 +45,7 @@ from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
 #: Limit (m) that replaces a missing limit of a prismatic joint.
 #: URDF requires limits.
-SLIDE_LIMIT = 1000.0
+FALLBACK_PRISMATIC_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
@@ -135,7 +135,7 @@ class Mjcf:
         index = mujoco.mj_name2id(self.fused_model, what, name) if name else -1
         return (kind, index) if index >= 0 else None
 
-    def distance_bounds(self, q: FloatArray) -> FloatArray:
+    def origin_distance_bounds(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
         The bound is the sum of the lengths of all translations from the world to the frame.
@@ -143,17 +143,17 @@ class Mjcf:
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
-            own = np.full(len(q), float(np.linalg.norm(m.body_pos[i])))
-            for j, kind, to in self._joints_of(i):
+            added_length = np.full(len(q), float(np.linalg.norm(m.body_pos[i])))
+            for j, kind, address in self._body_joints(i):
                 if kind == "free":
-                    own = np.linalg.norm(qpos[:, to : to + 3], axis=1)
+                    added_length = np.linalg.norm(qpos[:, address : address + 3], axis=1)
                 elif kind == "slide":
-                    own = own + qpos[:, to] + abs(m.qpos0[to])
-                own = own + 2.0 * np.linalg.norm(m.jnt_pos[j])
-            at_body[:, i] = at_body[:, m.body_parentid[i]] + own
-        return self._frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
+                    added_length = added_length + qpos[:, address] + abs(m.qpos0[address])
+                added_length = added_length + 2.0 * np.linalg.norm(m.jnt_pos[j])
+            at_body[:, i] = at_body[:, m.body_parentid[i]] + added_length
+        return self._make_frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
 
-    def reference_angles(self, q: FloatArray) -> FloatArray:
+    def hinge_angle_sums(self, q: FloatArray) -> FloatArray:
         """Return the sum of |q| + |ref| (rad) over the hinges of each frame, shape (n, frames).
 
         The hinges of a frame are the hinges between the world and the frame. A hinge is omitted if its
@@ -163,28 +163,30 @@ class Mjcf:
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
             at_body[:, i] = at_body[:, m.body_parentid[i]]
-            for _, kind, to in self._joints_of(i):
-                if kind == "hinge" and m.qpos0[to]:
-                    at_body[:, i] += qpos[:, to] + abs(m.qpos0[to])
-        return self._frame_values(at_body, np.zeros(m.nsite))
+            for _, kind, address in self._body_joints(i):
+                if kind == "hinge" and m.qpos0[address]:
+                    at_body[:, i] += qpos[:, address] + abs(m.qpos0[address])
+        return self._make_frame_values(at_body, np.zeros(m.nsite))
 
-    def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
+    def _body_joints(self, body: int) -> Iterator[tuple[int, str, int]]:
         m, kinds = self.model, import_mujoco().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         for j in _joint_indices(m, body):
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
-    def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
+    def _make_frame_values(self, body_values: FloatArray, site_values: FloatArray) -> FloatArray:
         """Return one number for each sample and frame, shape (n, frames).
 
-        `at_body` has the shape (n, bodies), and `own` has the shape (sites,). The columns of the
+        `body_values` has the shape (n, bodies), and `site_values` has the shape (sites,). The columns of the
         result are:
 
-        - for body i: `at_body[:, i]`
-        - for a site on body i: `at_body[:, i] + own[site]`
+        - for body i: `body_values[:, i]`
+        - for a site on body i: `body_values[:, i] + site_values[site]`
         """
         columns = [
-            at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
+            body_values[:, i]
+            if kind == "body"
+            else body_values[:, self.model.site_bodyid[i]] + site_values[i]
             for kind, i in self.frames.values()
         ]
         return np.stack(columns, axis=1)
@@ -355,7 +357,7 @@ def is_text(source: object) -> bool:
 
 #: Lists of MuJoCo's model that kinematics does not use.
 #: Keys are attributes of `MjSpec`; values are the singulars in messages.
-_SINGULAR = {
+_UNUSED_ELEMENTS = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
     "lights": "light", "meshes": "mesh", "hfields": "hfield", "materials": "material", "textures": "texture",
@@ -363,7 +365,7 @@ _SINGULAR = {
 
 
 def _find_unused_elements(spec: Any) -> Iterator[tuple[str, list[Any]]]:
-    for words in _SINGULAR:
+    for words in _UNUSED_ELEMENTS:
         if found := list(getattr(spec, words, ())):
             yield words, found
 
@@ -381,7 +383,7 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
             yield MjcfRemark(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(
-            f"{len(found)} {words if len(found) > 1 else _SINGULAR[words]}"
+            f"{len(found)} {words if len(found) > 1 else _UNUSED_ELEMENTS[words]}"
             for words, found in useless.items()
         )
         yield MjcfRemark(f"kinematics does not use {counts}")
@@ -441,16 +443,18 @@ class _MjcfReader:
     mimic_equalities: dict[int, str] = field(default_factory=dict)
     other_equalities: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
-    _link_names: set[str] = field(default_factory=set)
-    _joint_names: set[str] = field(default_factory=set)
+    _used_link_names: set[str] = field(default_factory=set)
+    _used_joint_names: set[str] = field(default_factory=set)
     _links: list[str] = field(default_factory=list)
-    _hinges: dict[int, str] = field(default_factory=dict)
+    _joint_name_by_index: dict[int, str] = field(default_factory=dict)
 
     def make_tree(self) -> KinematicTree:
         m = self.model
-        self._links = [make_unique(m.body(i).name or f"body{i}", self._link_names) for i in range(m.nbody)]
-        self._hinges = {
-            i: make_unique(m.joint(i).name or f"joint{i}", self._joint_names) for i in range(m.njnt)
+        self._links = [
+            make_unique(m.body(i).name or f"body{i}", self._used_link_names) for i in range(m.nbody)
+        ]
+        self._joint_name_by_index = {
+            i: make_unique(m.joint(i).name or f"joint{i}", self._used_joint_names) for i in range(m.njnt)
         }
         for i in range(m.nbody):
             self.frames[self._links[i]] = "body", i
@@ -458,7 +462,7 @@ class _MjcfReader:
                 self._add_body(i)
         for i in range(m.nsite):
             if name := m.site(i).name:
-                link = make_unique(name, self._link_names)
+                link = make_unique(name, self._used_link_names)
                 self.frames[link] = "site", i
                 T = _pose(m.site_pos[i], m.site_quat[i])
                 self._add_fixed_joint(T, self._links[m.site_bodyid[i]], link)
@@ -467,7 +471,7 @@ class _MjcfReader:
         return build_tree(self.name, self._links[0], joints)
 
     def _add_fixed_joint(self, T: FloatArray, parent: str, child: str) -> None:
-        name = make_unique(f"{child}_fixed", self._joint_names)
+        name = make_unique(f"{child}_fixed", self._used_joint_names)
         self._joints.append((make_fixed_joint(name, T), parent, child))
 
     def _add_body(self, i: int) -> None:
@@ -478,9 +482,9 @@ class _MjcfReader:
             self.remarks.append(MjcfRemark(what, f"body {link}", moves=True))
         joints = _joint_indices(m, i)
         for j in joints:
-            anchor, name = pose(p=m.jnt_pos[j]), self._hinges[j]
+            anchor, name = pose(p=m.jnt_pos[j]), self._joint_name_by_index[j]
             ends_here = j == joints[-1] and not m.jnt_pos[j].any()
-            child = link if ends_here else make_unique(f"{name}_link", self._link_names)
+            child = link if ends_here else make_unique(f"{name}_link", self._used_link_names)
             joint, back = self._make_joint(j, name, T @ anchor)
             self._joints.append((joint, here, child))
             self.qpos_index[name] = int(m.jnt_qposadr[j])
@@ -525,9 +529,12 @@ class _MjcfReader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        what = f"a slide joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
+        what = (
+            f"a slide joint without limits gets +-{FALLBACK_PRISMATIC_LIMIT:g} m,"
+            " because URDF requires limits"
+        )
         self.remarks.append(MjcfRemark(what, f"joint {name}"))
-        return JointKind.PRISMATIC, Limit(-SLIDE_LIMIT, SLIDE_LIMIT, np.inf, effort)
+        return JointKind.PRISMATIC, Limit(-FALLBACK_PRISMATIC_LIMIT, FALLBACK_PRISMATIC_LIMIT, np.inf, effort)
 
     def _read_rules(self) -> Iterator[tuple[str, Mimic]]:
         m, rules = self.model, dict[str, Mimic]()
@@ -540,7 +547,9 @@ class _MjcfReader:
                 self.remarks.append(MjcfRemark("a constraint that is not active", where))
                 continue
             if rule is None:
-                names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
+                names = _join_names(
+                    *(self._joint_name_by_index[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0)
+                )
                 what = f"a constraint ({names}) that is not a linear relation of two joints"
             elif rule[0] in rules or depends_on(rules, rule[1].mimicked_joint, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a cycle"
@@ -565,7 +574,9 @@ class _MjcfReader:
         if x < 0 or c[2:].any():
             return None
         y0, x0 = (float(m.qpos0[m.jnt_qposadr[j]]) for j in (y, x))
-        return self._hinges[y], Mimic(self._hinges[x], float(c[1]), float(y0 + c[0] - c[1] * x0))
+        return self._joint_name_by_index[y], Mimic(
+            self._joint_name_by_index[x], float(c[1]), float(y0 + c[0] - c[1] * x0)
+        )
 
 
 def make_unique(name: str, used_names: set[str]) -> str:

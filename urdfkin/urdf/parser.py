@@ -49,8 +49,8 @@ from urdfkin.urdf.records import (
 
 # -- bytes
 
-EMPTY = Rule("URDF101", "empty-file", ERROR)
-ENCODING = Rule("URDF102", "not-utf8", ERROR)
+EMPTY_FILE = Rule("URDF101", "empty-file", ERROR)
+NOT_UTF8 = Rule("URDF102", "not-utf8", ERROR)
 DECLARED_ENCODING = Rule("URDF103", "declared-encoding", ERROR)
 UNUSED_DECLARED_ENCODING = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
@@ -75,11 +75,11 @@ def read_utf8(report: Reporter, data: bytes) -> bytes | None:
     """Return the UTF-8 bytes without a byte order mark; None after an error."""
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
-        report.add(EMPTY, what, remedy="check the program that wrote the file")
+        report.add(EMPTY_FILE, what, remedy="check the program that wrote the file")
         return None
     wide = next((encoding for encoding, begins in _WIDE_ENCODINGS.items() if data.startswith(begins)), None)
     if wide is not None:
-        report.add(ENCODING, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
+        report.add(NOT_UTF8, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
         return None
     text = data.removeprefix(codecs.BOM_UTF8)
     declared = _declared_encoding(text)
@@ -102,7 +102,7 @@ def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     if zero >= 0:
         message = "the text contains a zero byte: some readers stop there, others continue"
         remedy = "check the file: it is not a text file, or it is damaged"
-        report.add(ENCODING, message, remedy=remedy, position=line_and_column(text, zero))
+        report.add(NOT_UTF8, message, remedy=remedy, position=line_and_column(text, zero))
         return False
     try:
         text.decode("utf-8")
@@ -111,7 +111,7 @@ def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
         message = f"a byte is not UTF-8{claim}"
         remedy = "save the file as UTF-8"
         found = f"0x{text[error.start]:02x}"
-        report.add(ENCODING, message, found=found, remedy=remedy, position=line_and_column(text, error.start))
+        report.add(NOT_UTF8, message, found=found, remedy=remedy, position=line_and_column(text, error.start))
         return False
     return True
 
@@ -171,7 +171,7 @@ INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
 #: Maximum depth of nested elements in older versions of libxml2.
-COMMON_DEPTH = 256
+LIBXML2_DEPTH = 256
 
 #: Maximum number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
@@ -189,11 +189,11 @@ class _StopError(Exception):
 
 def read_document(report: Reporter) -> Element | None:
     """Parse the file of `report` and return its root element; None after an error."""
-    data, most = report.data, report.limits.bytes
-    if len(data) > most:
+    data, max_bytes = report.data, report.limits.bytes
+    if len(data) > max_bytes:
         message = "the file is too large"
         remedy = "if the file is correct, raise the limit with --max-bytes"
-        report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {most}", remedy=remedy)
+        report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {max_bytes}", remedy=remedy)
         return None
     text = read_utf8(report, data)
     if text is None:
@@ -207,16 +207,16 @@ def read_document(report: Reporter) -> Element | None:
     except expat.ExpatError as error:
         builder.report_syntax_error(error)
         return None
-    if builder.max_depth > COMMON_DEPTH:
-        rule, reader, most = DEEP_NESTING, "older readers built on libxml2 refuse", COMMON_DEPTH
+    if builder.max_depth > LIBXML2_DEPTH:
+        rule, reader, max_depth = DEEP_NESTING, "older readers built on libxml2 refuse", LIBXML2_DEPTH
         if builder.max_depth > ORACLE_DEPTH:
-            rule, reader, most = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
+            rule, reader, max_depth = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
         what = f"elements are nested {builder.max_depth} deep"
         report.add(
             rule,
             what,
             builder.deepest_element,
-            remedy=f"remove the nesting: {reader} more than {most} levels",
+            remedy=f"remove the nesting: {reader} more than {max_depth} levels",
         )
     return builder.root
 
@@ -266,7 +266,7 @@ class _Builder:
             if not self.has_ignore_comment:
                 self.parser.CommentHandler = None
         else:
-            element.top_ancestor = None if parent is self.root else parent.top_element
+            element.top_level_ancestor = None if parent is self.root else parent.top_level_element
             parent.append(element)
         for comment in self.pending_comments:
             comment.element = element
@@ -278,20 +278,24 @@ class _Builder:
         self.check_limits(tag, attributes)
 
     def check_limits(self, tag: str, attributes: dict[str, str]) -> None:
-        most = self.limits
-        if self.max_depth > most.depth:
-            self.refuse(TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels")
-        if self.count > most.elements:
-            self.refuse(TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}")
-        if len(attributes) > most.attributes:
-            found = f"{len(attributes)} in <{shorten(tag)}>, more than {most.attributes}"
+        size_limits = self.limits
+        if self.max_depth > size_limits.depth:
+            self.refuse(
+                TOO_DEEP, "depth", "elements are nested too deep", f"more than {size_limits.depth} levels"
+            )
+        if self.count > size_limits.elements:
+            self.refuse(
+                TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {size_limits.elements}"
+            )
+        if len(attributes) > size_limits.attributes:
+            found = f"{len(attributes)} in <{shorten(tag)}>, more than {size_limits.attributes}"
             self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
-        if len(tag) > most.name:
+        if len(tag) > size_limits.name:
             self.refuse_name("the tag of an element", tag)
         for key, value in attributes.items():
-            if len(key) > most.name:
+            if len(key) > size_limits.name:
                 self.refuse_name("the name of an attribute", key)
-            if len(value) > most.name and key in _NAME_ATTRIBUTES:
+            if len(value) > size_limits.name and key in _NAME_ATTRIBUTES:
                 self.refuse_name(f"the {key} of <{shorten(tag)}>", value)
 
     def refuse_name(self, what: str, name: str) -> None:
@@ -368,7 +372,7 @@ class _Builder:
             self.report_undefined_entity(self._entity_name())
             return
         innermost = self.open[-1] if self.open else None
-        message, remedy = _REASONS.get(reason, (reason, None))
+        message, remedy = _TEXTS_BY_EXPAT_ERROR.get(reason, (reason, None))
         if innermost is not None:
             opened = f"<{innermost.tag}>, opened on line {innermost.line},"
             if reason == expat.errors.XML_ERROR_TAG_MISMATCH:
@@ -394,7 +398,7 @@ _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
 #: Pairs (message, remedy or None) for each message of expat.
-_REASONS: dict[str, tuple[str, str | None]] = {
+_TEXTS_BY_EXPAT_ERROR: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
     expat.errors.XML_ERROR_BAD_CHAR_REF: ("a character that XML does not allow", None),
@@ -419,7 +423,7 @@ _REASONS: dict[str, tuple[str, str | None]] = {
 
 BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)
 BAD_VECTOR = Rule("URDF302", "bad-vector", ERROR)
-WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
+WHITESPACE_IN_NUMBER = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
@@ -449,7 +453,7 @@ class NumberReader:
         value = self._read_number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
         if value is not None and written != written.rstrip():
             self._report_refused_by_urdfdom(element, attribute, "a space after the number")
-        elif value is not None and self.report.has_raw_blanks:
+        elif value is not None and self.report.has_replaced_characters:
             self._check_raw(element, attribute, 1)
         return value
 
@@ -477,7 +481,7 @@ class NumberReader:
                 self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
             )
             return None
-        if self.report.has_raw_blanks:
+        if self.report.has_replaced_characters:
             self._check_raw(element, attribute, count)
         return tuple(values)
 
@@ -489,7 +493,7 @@ class NumberReader:
                 remedy, found = "check the exponent", quote(piece)
                 self.report.add(UNDERFLOW, message, element, attribute=attribute, found=found, remedy=remedy)
             return value
-        what = attribute if element.tag in _ELEMENTS_NOT_NAMED else f"{attribute} of <{element.tag}>"
+        what = attribute if element.tag in _TAGS_OMITTED_IN_MESSAGES else f"{attribute} of <{element.tag}>"
         part = "" if piece == element.attributes[attribute] else "a part of "
         message, remedy = f"{part}{what} is not a number{self.effect}", _remedy(piece)
         if value is not None:
@@ -498,14 +502,14 @@ class NumberReader:
         self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
 
-    def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report a number with more than `most` characters.
+    def _is_too_long(self, element: Element, attribute: str, written: str, max_length: int) -> bool:
+        """Report a number with more than `max_length` characters.
 
         The conversion of a long text to a number takes quadratic time.
         """
-        if len(written) <= most:
+        if len(written) <= max_length:
             return False
-        found = f"{quote(written, 30)} of {len(written)} characters, more than {most}"
+        found = f"{quote(written, 30)} of {len(written)} characters, more than {max_length}"
         remedy = "write 17 digits, enough for every double, or raise the limit with --max-number"
         self.report.add(
             NUMBER_TOO_LONG, f"{attribute} is too long for a number", element,
@@ -521,7 +525,7 @@ class NumberReader:
             element, attribute, raw_value, count * self.report.limits.number
         ):
             return
-        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw_value))
+        seen = html.unescape(_LEADING_ZEROS_OF_REFERENCE.sub(r"\1", raw_value))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
         if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
             self._report_refused_by_urdfdom(
@@ -530,7 +534,7 @@ class NumberReader:
 
     def _report_refused_by_urdfdom(self, element: Element, attribute: str, what: str) -> None:
         value = element.attributes[attribute]
-        rule, message = WHITESPACE, f"{attribute} has {what}, which urdfdom refuses"
+        rule, message = WHITESPACE_IN_NUMBER, f"{attribute} has {what}, which urdfdom refuses"
         if self.bad_number is not BAD_NUMBER:  # Kinematics does not use this number.
             rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
@@ -546,10 +550,10 @@ class NumberReader:
 
 #: Messages about invalid numbers in these elements name the attribute, but not the tag.
 #: For other elements, the message also names the element.
-_ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
+_TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
-_LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
+_LEADING_ZEROS_OF_REFERENCE = re.compile(r"(&#[xX]?)0+")
 
 #: Patterns of invalid numbers, with remedies. The first matching pattern determines the remedy.
 _REMEDIES = (
@@ -586,7 +590,7 @@ EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
 MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
 IGNORED_VALUE = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
-QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
+QUAT_XYZW = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
@@ -622,7 +626,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-_FORMATS = {
+_REMEDY_BY_ROOT_TAG = {
     "sdf": "this is an SDF file; convert the file to a URDF first",
     "mujoco": "this is an MJCF file; `load` and the commands read MJCF files with the suffix .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
@@ -643,7 +647,7 @@ def _report_other_format(report: Reporter, root: Element) -> None:
     elif local.lower() == "robot":
         remedy = "write <robot> in lower case"
     else:
-        remedy = _FORMATS.get(local.lower(), "a URDF begins with <robot name=...>")
+        remedy = _REMEDY_BY_ROOT_TAG.get(local.lower(), "a URDF begins with <robot name=...>")
     report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
 
 
@@ -699,7 +703,7 @@ class JointReader:
         self._read_axis(joint)
         self._read_limit(joint)
         self._read_mimic(joint)
-        self._check_unused_elements(joint)
+        self._check_nonkinematic_elements(joint)
         return joint
 
     def read_required(
@@ -772,7 +776,7 @@ class JointReader:
         else:
             joint.quaternion = quaternion
             message = "urdfkin uses quat_xyzw, but most readers ignore this rotation"
-            add(QUATERNION, message, "write the rotation as rpy for these readers")
+            add(QUAT_XYZW, message, "write the rotation as rpy for these readers")
 
     def _read_axis(self, joint: JointRecord) -> None:
         axis = joint.axis_element = joint.element.find("axis")
@@ -798,7 +802,7 @@ class JointReader:
         bounded = joint.kind in ("revolute", "prismatic")
         if limit is None:
             if bounded:
-                remedy = f"write {_EXAMPLE_LIMIT}"
+                remedy = f"write {_LIMIT_EXAMPLE}"
                 if joint.kind == "revolute":
                     remedy += ', or type="continuous" if the joint rotates without limits'
                 what = f"a {joint.kind} joint needs a <limit>"
@@ -806,7 +810,7 @@ class JointReader:
             return
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
         for attribute in required:
-            self.read_required(limit, attribute, _EXAMPLE_LIMIT, number=True)
+            self.read_required(limit, attribute, _LIMIT_EXAMPLE, number=True)
         names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
         values = {name: self.numbers.read_scalar(limit, name) for name in names}
         joint.limit = LimitRecord(limit, **values)
@@ -821,7 +825,7 @@ class JointReader:
         if mimicked_joint is not None and multiplier is not None and offset is not None:
             joint.mimic = MimicRecord(mimic, mimicked_joint, multiplier, offset)
 
-    def _check_unused_elements(self, joint: JointRecord) -> None:
+    def _check_nonkinematic_elements(self, joint: JointRecord) -> None:
         """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""
         dynamics, safety = (joint.element.find(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
@@ -835,7 +839,7 @@ class JointReader:
                     self.numbers.read_scalar(element, attribute)
 
 
-_EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
+_LIMIT_EXAMPLE = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
 #: Numeric attributes without effect on kinematics.
 _UNUSED_NUMBERS = {

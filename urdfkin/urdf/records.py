@@ -53,7 +53,8 @@ class Element:
 
     Attributes:
         offset: Index of the start tag's first byte, without counting a byte order mark.
-        top_ancestor: The child of `<robot>` that contains this element; None for the children of `<robot>`.
+        top_level_ancestor: The child of `<robot>` that contains this element; None for the children of
+            `<robot>`.
         text: The first characters of the text between the element's tags.
     """
 
@@ -63,7 +64,7 @@ class Element:
     line: int
     column: int
     offset: int
-    top_ancestor: Element | None = None
+    top_level_ancestor: Element | None = None
     children: Sequence[Element] = ()
     text: str = ""
 
@@ -89,12 +90,12 @@ class Element:
             stack += reversed(element.children)
 
     @property
-    def top_element(self) -> Element:
+    def top_level_element(self) -> Element:
         """The child of `<robot>` that is or contains this element.
 
-        For `<robot>`, `top_element` is `<robot>` itself.
+        For `<robot>`, `top_level_element` is `<robot>` itself.
         """
-        return self.top_ancestor or self
+        return self.top_level_ancestor or self
 
 
 Vector = tuple[float, ...]

@@ -255,7 +255,7 @@ def _read_file(path: Path, max_bytes: int) -> UrdfText:
         return UrdfText(read_start(path, max_bytes + 1, pipes=True), str(path), unambiguous_path(path))
     except SourceError as error:
         if isinstance(error.__cause__, FileNotFoundError):
-            raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
+            raise SourceError("no such file", where=str(path), remedy=_missing_file_remedy(path)) from None
         if isinstance(error.__cause__, IsADirectoryError):
             remedy = "name the .urdf file in this folder"
             raise SourceError("this is a folder, not a file", where=str(path), remedy=remedy) from None
@@ -276,7 +276,7 @@ def find_entry(name: str) -> CatalogueEntry | None:
     return None if "." in name or os.sep in name else catalogue().get(name)
 
 
-def _nearest_file(path: Path) -> str:
+def _missing_file_remedy(path: Path) -> str:
     try:
         names = [entry.name for entry in path.parent.iterdir()]
     except FileNotFoundError:

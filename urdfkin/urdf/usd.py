@@ -48,7 +48,13 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import MAX_BYTES, read_start
 from urdfkin.system.lazy_import import install_command, installed_version
 from urdfkin.urdf.confinement import AllowedPaths
-from urdfkin.urdf.mjcf import SLIDE_LIMIT, depends_on, make_fixed_joint, make_unique, resolve_rule
+from urdfkin.urdf.mjcf import (
+    FALLBACK_PRISMATIC_LIMIT,
+    depends_on,
+    make_fixed_joint,
+    make_unique,
+    resolve_rule,
+)
 from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
@@ -66,7 +72,7 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 _MAX_SHEAR = 14.0
 #: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
 #: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
-_NEGLIGIBLE_DEGREES = 0.01
+_NEGLIGIBLE_LIMIT_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
@@ -82,9 +88,9 @@ _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: URDF mimic rules are linear.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
-_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+_MOTION_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xform prims that contain the shapes of a body.
-_SHAPE_GROUPS = ("visual", "visuals", "collision", "collisions")
+_SHAPE_XFORM_NAMES = ("visual", "visuals", "collision", "collisions")
 #: Rotation of the y axis onto the z axis.
 _ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
@@ -145,8 +151,8 @@ class Usd:
             UsdGeom computes the poses.
         rest_q: (nq,) configuration in which the links have the poses `rest_poses`. For planar and floating
             joints, `rest_q` contains the zero configuration.
-        single_precision: Five numbers for each joint, by joint name. The numbers bound the effect of rounding
-            to single precision:
+        single_rounding_terms: Five numbers for each joint, by joint name. The numbers bound the effect of
+            rounding to single precision:
 
             1. a bound on the error (m) of the joint origins,
             2. a bound on the error (rad) of the joint orientations,
@@ -161,7 +167,7 @@ class Usd:
     prims: dict[str, str]
     rest_poses: FloatArray
     rest_q: FloatArray
-    single_precision: dict[str, tuple[float, float, float, float, float]]
+    single_rounding_terms: dict[str, tuple[float, float, float, float, float]]
     joints: dict[str, UsdJoint]
     stage: Any
     meters_per_unit: float
@@ -230,13 +236,13 @@ def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
     """
     found: list[str] = []
 
-    def visit(path: Any) -> None:
+    def find_clips(path: Any) -> None:
         if path.IsPrimPath() or path.IsPrimVariantSelectionPath():
             spec = layer.GetObjectAtPath(path)
             if spec is not None and any(spec.HasInfo(key) for key in ("clips", "clipSets")):
                 found.append(str(path))
 
-    layer.Traverse(pxr.Sdf.Path.absoluteRootPath, visit)
+    layer.Traverse(pxr.Sdf.Path.absoluteRootPath, find_clips)
     if found:
         raise _make_refusal("a prim has value clips, which urdfkin does not read", where, found[0])
 
@@ -306,7 +312,7 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
     stage.SetEditTarget(stage.GetSessionLayer())
     expanded_instances = set[str]()
     for word, variant in variants:
-        sets = _variant_sets(pxr, stage)
+        sets = _prims_by_variant_set(pxr, stage)
         while inside := [prim for prim in sets.get(word, []) if prim.IsInstanceProxy()]:
             for prim in inside:
                 outer = prim.GetParent()
@@ -314,7 +320,7 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
                     outer = outer.GetParent()
                 outer.SetInstanceable(False)
                 expanded_instances.add(str(outer.GetPath()))
-            sets = _variant_sets(pxr, stage)
+            sets = _prims_by_variant_set(pxr, stage)
         if word not in sets:
             raise UnknownNameError("variant set", word, list(sets), where=name)
         own = [prim.GetVariantSet(word) for prim in sets[word]]
@@ -326,7 +332,7 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
     return frozenset(expanded_instances)
 
 
-def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
+def _prims_by_variant_set(pxr: Any, stage: Any) -> dict[str, list[Any]]:
     sets: dict[str, list[Any]] = {}
     every = pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
     for prim in pxr.Usd.PrimRange.Stage(stage, every):
@@ -338,7 +344,7 @@ def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
 @dataclass(slots=True)
 class _Body:
     T: FloatArray
-    owner: str | None
+    articulation_root: str | None
 
 
 @dataclass(slots=True)
@@ -389,14 +395,14 @@ class _StageReader:
     _bodies: dict[str, _Body] = field(default_factory=dict)
     _edges: list[_JointPrim] = field(default_factory=list)
     _joints_read: dict[str, UsdJoint] = field(default_factory=dict)
-    _single_precision: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
+    _single_rounding_terms: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
     # Pinocchio names the world `universe`, and a moving base's joint `root_joint`.
-    _link_names: set[str] = field(default_factory=lambda: {"universe"})
-    _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
+    _used_link_names: set[str] = field(default_factory=lambda: {"universe"})
+    _used_joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _meters_per_unit: float = 1.0
     _up: FloatArray = field(default_factory=lambda: np.eye(3))
     _cache: Any = None
-    _instancers: list[str] = field(default_factory=list)
+    _point_instancers: list[str] = field(default_factory=list)
     _checked_paths: set[str] = field(default_factory=set)
 
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
@@ -417,18 +423,18 @@ class _StageReader:
         chosen = self._choose_articulation(articulations, articulation)
         tree, links = self._make_tree(chosen)
         self._report_loose_bodies(chosen, articulations)
-        rest = np.array([self._world_pose(stage.GetPrimAtPath(path))[0] for path in links.values()])
-        rest_q = self._find_rest_configuration(tree, chosen, links, rest)
-        self._report_unit_and_up_axis(rest)
-        self._report_layers([*links.values(), *self._joints_read])
+        rest_poses = np.array([self._world_pose(stage.GetPrimAtPath(path))[0] for path in links.values()])
+        rest_q = self._find_rest_configuration(tree, chosen, links, rest_poses)
+        self._report_unit_and_up_axis(rest_poses)
+        self._report_layer_differences([*links.values(), *self._joints_read])
         if count := sum(prim.IsA(pxr.UsdGeom.Gprim) for prim in prims):
             self._report("unused-in-usd", "", f"kinematics does not use the {count} shapes")
         return Usd(
             tree,
             links,
-            rest,
+            rest_poses,
             rest_q,
-            self._single_precision,
+            self._single_rounding_terms,
             self._joints_read,
             stage,
             self._meters_per_unit,
@@ -452,7 +458,7 @@ class _StageReader:
                 continue
             every.PruneChildren()
             path = str(prim.GetPath())
-            self._instancers.append(path + "/")
+            self._point_instancers.append(path + "/")
             below = list(self.pxr.Usd.PrimRange(prim, inside))
             bodies = sum(one.HasAPI(physics.RigidBodyAPI) for one in below)
             joints = sum(one.IsA(physics.Joint) for one in below)
@@ -479,7 +485,7 @@ class _StageReader:
         self._report_timed(attribute, f"urdfkin takes {value}")
         return value
 
-    def _report_timed(self, attribute: Any, instead: str) -> None:
+    def _report_timed(self, attribute: Any, consequence: str) -> None:
         path = str(attribute.GetPath())
         if path in self._checked_paths:
             return
@@ -489,7 +495,7 @@ class _StageReader:
             return
         if not attribute.GetResolveInfo(self.pxr.Usd.TimeCode.Default()).HasAuthoredValue():
             where = str(attribute.GetPrim().GetPath())
-            what = f"{attribute.GetName()} has {kind}, but no default value, so {instead}"
+            what = f"{attribute.GetName()} has {kind}, but no default value, so {consequence}"
             self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
@@ -503,7 +509,7 @@ class _StageReader:
                     return
             prim = prim.GetParent()
 
-    def _find_uneven_scale(self, prim: Any) -> str | None:
+    def _describe_uneven_scale(self, prim: Any) -> str | None:
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -527,7 +533,7 @@ class _StageReader:
         if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
             message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
-            raise InputError(message, where=where, found=self._find_uneven_scale(prim), remedy=remedy)
+            raise InputError(message, where=where, found=self._describe_uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
         return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._meters_per_unit), scale
 
@@ -543,7 +549,7 @@ class _StageReader:
             if scale[0] < 0.0:
                 what = "the transform of this body contains a reflection"
                 self._report("mirrored-body", path, what, "mirror the shapes instead")
-            self._bodies[path] = _Body(T, self._find_owner(prim))
+            self._bodies[path] = _Body(T, self._find_articulation_root(prim))
         for prim in prims:
             if prim.IsA(physics.Joint) and (edge := self._read_joint(prim)) is not None:
                 self._edges.append(edge)
@@ -580,7 +586,7 @@ class _StageReader:
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
-    def _find_owner(self, prim: Any) -> str | None:
+    def _find_articulation_root(self, prim: Any) -> str | None:
         """Return the path of the articulation root at or above a prim, or None."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
@@ -601,15 +607,15 @@ class _StageReader:
             if len(targets) > 1:
                 self._report("left-out-of-usd", path, f"body{i} of this joint has {len(targets)} targets")
                 return None
-            side = self._read_side(prim, i, str(targets[0]) if targets else None)
+            side = self._read_joint_frame(prim, i, str(targets[0]) if targets else None)
             if side is None:
-                instanced = self._is_instanced(targets[0])
+                instanced = self._is_in_point_instancer(targets[0])
                 reason = "is a prototype of a PointInstancer" if instanced else "does not exist"
                 what = f"body{i} of this joint names a prim that {reason}: {targets[0]}"
                 self._report("outside-joint", path, what, "correct the relationship")
                 return None
             sides.append(side)
-        (first, A, size_A, off_A), (second, B, size_B, off_B) = sides
+        (first, A, length_A, error_bounds_A), (second, B, length_B, error_bounds_B) = sides
         if first == second:
             where = "the world" if first is None else "one body"
             self._report("left-out-of-usd", path, f"both ends of this joint are in {where}")
@@ -622,22 +628,25 @@ class _StageReader:
                 what = f"this {kind_name} is excluded from the articulation"
             self._report("left-out-of-usd", path, what)
             return None
-        kind, axis, limits, free = self._read_motion(prim)
-        size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
+        kind, axis, limits, directions = self._read_motion(prim)
+        length_sum, error_bounds = (
+            length_A + length_B,
+            (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
+        )
         # A and B are poses relative to a body or a world.
         # In this world, z is up.
         # `UsdJoint` contains poses relative to a body or the stage's world.
         # In the stage's world, y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
-            free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
-            D[:3, 3], quaternion_of(D[:3, :3]), limits, size,
+            directions, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
+            D[:3, 3], quaternion_of(D[:3, :3]), limits, length_sum,
         )  # fmt: skip
         return _JointPrim(
-            prim, prim.GetName(), path, kind, axis, (first, second), (A, B), limits, size, rounded
+            prim, prim.GetName(), path, kind, axis, (first, second), (A, B), limits, length_sum, error_bounds
         )
 
-    def _read_side(
+    def _read_joint_frame(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return four values for body i of a joint.
@@ -657,16 +666,16 @@ class _StageReader:
             message = f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero"
             found = f"{p.tolist()}, {quaternion}"
             raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
-        off = float(np.linalg.norm(_rounding(p))) * self._meters_per_unit, _quaternion_rounding(xyzw)
+        error_bounds = float(np.linalg.norm(_rounding(p))) * self._meters_per_unit, _quaternion_rounding(xyzw)
         R, p = rotation_from_quaternion(xyzw / size), p * self._meters_per_unit
         if target is None:
-            return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
+            return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), error_bounds
         other = self.stage.GetPrimAtPath(target)
-        if not other or not other.IsDefined() or self._is_instanced(target):
+        if not other or not other.IsDefined() or self._is_in_point_instancer(target):
             return None
         T, scale = self._world_pose(other)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
-        off = off[0] * float(np.abs(scale).max()), off[1]
+        error_bounds = error_bounds[0] * float(np.abs(scale).max()), error_bounds[1]
         while other and str(other.GetPath()) not in self._bodies:
             other = other.GetParent()
         body = str(other.GetPath()) if other else None
@@ -674,14 +683,16 @@ class _StageReader:
             T = T if body is None else inverse(self._bodies[body].T) @ T
             A, length = T @ A, length + float(np.linalg.norm(T[:3, 3]))
             moved, turned = self._rounding_of_transforms(target, body, length)
-            off = off[0] + moved, off[1] + turned
-        return body, A, length, off
+            error_bounds = error_bounds[0] + moved, error_bounds[1] + turned
+        return body, A, length, error_bounds
 
-    def _rounding_of_transforms(self, path: str, body: str | None, length: float) -> tuple[float, float]:
+    def _rounding_of_transforms(
+        self, path: str, body: str | None, translation_length_sum: float
+    ) -> tuple[float, float]:
         """Return bounds on the errors of a prim's position (m) and orientation (rad) relative to a body.
 
         The cause of the errors is rounding to single precision. The body None is the world. An error in the
-        rotation of a prim also displaces all prims below the prim. `length` is the sum of the lengths (m) of
+        rotation of a prim also displaces all prims below the prim. `translation_length_sum` is the sum of the lengths (m) of
         the translations from the body to the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
@@ -693,10 +704,13 @@ class _StageReader:
                     turned |= rotates
                     moved |= not rotates or str(prim.GetPath()) != path
             prim = prim.GetParent()
-        return SINGLE_ROUNDOFF * length if moved else 0.0, 2.0 * SINGLE_ROUNDOFF if turned else 0.0
+        return (
+            SINGLE_ROUNDOFF * translation_length_sum if moved else 0.0,
+            2.0 * SINGLE_ROUNDOFF if turned else 0.0,
+        )
 
-    def _is_instanced(self, path: object) -> bool:
-        return any(str(path).startswith(one) for one in self._instancers)
+    def _is_in_point_instancer(self, path: object) -> bool:
+        return any(str(path).startswith(one) for one in self._point_instancers)
 
     def _read_motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return kind, axis, limits (rad or m) and free directions; refuse an unsupported joint."""
@@ -724,7 +738,7 @@ class _StageReader:
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the result of `_read_motion` for a `PhysicsJoint`, which has limits for six directions."""
         limits: dict[str, tuple[float, float]] = {}
-        for direction in _DIRECTIONS:
+        for direction in _MOTION_DIRECTIONS:
             low, high = _NO_LIMITS
             if f"PhysicsLimitAPI:{direction}" in _schemas(prim):
                 low, high = (
@@ -732,19 +746,21 @@ class _StageReader:
                 )
             if low <= high:  # A lower limit above the upper limit locks the direction.
                 limits[direction] = low, high
-        free = tuple(limits)
-        if not free:
+        free_directions = tuple(limits)
+        if not free_directions:
             return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
-        if len(free) == 1:
-            return self._make_motion(path, free[0], iter(limits[free[0]]))
-        kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _DIRECTIONS: JointKind.FLOATING}.get(free)
+        if len(free_directions) == 1:
+            return self._make_motion(path, free_directions[0], iter(limits[free_directions[0]]))
+        kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _MOTION_DIRECTIONS: JointKind.FLOATING}.get(
+            free_directions
+        )
         if kind is None:
             message = "urdfkin does not support a joint with these degrees of freedom"
             remedy = "leave one degree of freedom free, or write several joints with a body between them"
-            raise InputError(message, where=path, found=", ".join(free), remedy=remedy)
+            raise InputError(message, where=path, found=", ".join(free_directions), remedy=remedy)
         if any(math.isfinite(end) for ends in limits.values() for end in ends):
             self._report("unused-in-usd", path, "the limits of this planar or floating joint are not read")
-        return kind, _unit(0), _NO_LIMITS, " ".join(free)
+        return kind, _unit(0), _NO_LIMITS, " ".join(free_directions)
 
     def _read_limit(self, prim: Any, name: str) -> float:
         """Return a limit of a `PhysicsJoint`.
@@ -760,55 +776,57 @@ class _StageReader:
         return float(self._read_value(prim, name))
 
     def _make_motion(
-        self, path: str, free: str, ends: Iterator[float]
+        self, path: str, direction: str, limits: Iterator[float]
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        lower, upper = (math.copysign(math.inf, end) if abs(end) >= _LARGEST_SINGLE else end for end in ends)
+        lower, upper = (
+            math.copysign(math.inf, end) if abs(end) >= _LARGEST_SINGLE else end for end in limits
+        )
         if not lower <= upper:
             message = "the lower limit of a joint is above its upper limit"
             raise InputError(message, where=path, found=f"{lower:g} and {upper:g}")
         kind, factor = JointKind.PRISMATIC, self._meters_per_unit
-        if free.startswith("rot"):
+        if direction.startswith("rot"):
             bounded = math.isfinite(lower) and math.isfinite(upper)
             kind, factor = JointKind.REVOLUTE if bounded else JointKind.CONTINUOUS, math.pi / 180.0
-        return kind, _unit(_AXIS_INDEX[free[-1]]), (lower * factor, upper * factor), free
+        return kind, _unit(_AXIS_INDEX[direction[-1]]), (lower * factor, upper * factor), direction
 
     # -- articulations -------------------------------------------------------------------------------
 
     def _find_articulations(self) -> list[_Articulation]:
         """Return the groups of connected bodies; report and ignore joints between articulations."""
-        above: dict[str, str] = {path: path for path in self._bodies}
+        representative: dict[str, str] = {path: path for path in self._bodies}
 
-        def top(path: str) -> str:
+        def find_representative(path: str) -> str:
             """Return the body that represents a group of bodies (union-find)."""
-            while above[path] != path:
-                above[path] = above[above[path]]
-                path = above[path]
+            while representative[path] != path:
+                representative[path] = representative[representative[path]]
+                path = representative[path]
             return path
 
-        owner = {path: body.owner for path, body in self._bodies.items()}
+        root_by_body = {path: body.articulation_root for path, body in self._bodies.items()}
         tree_edges = []
         for edge in self._edges:
             first, second = edge.ends
             if first is not None and second is not None:
-                a, b = top(first), top(second)
+                a, b = find_representative(first), find_representative(second)
                 if a == b:
                     self._report_loop(edge)
                     continue
-                owners = {one for one in (owner[a], owner[b]) if one is not None}
-                if len(owners) > 1:
-                    both = " and ".join(sorted(owners))
+                roots = {one for one in (root_by_body[a], root_by_body[b]) if one is not None}
+                if len(roots) > 1:
+                    both = " and ".join(sorted(roots))
                     what = f"this {edge.kind.value} joint connects two articulations: {both}"
                     self._report("outside-joint", edge.path, what)
                     continue
-                above[b] = a
-                owner[a] = next(iter(owners), None)
+                representative[b] = a
+                root_by_body[a] = next(iter(roots), None)
             tree_edges.append(edge)
         groups: dict[str, _Articulation] = {}
         for edge in tree_edges:
-            key = top(next(end for end in edge.ends if end is not None))
-            groups.setdefault(key, _Articulation(owner[key] or "", [], [])).edges.append(edge)
+            key = find_representative(next(end for end in edge.ends if end is not None))
+            groups.setdefault(key, _Articulation(root_by_body[key] or "", [], [])).edges.append(edge)
         for path in self._bodies:
-            if (key := top(path)) in groups:
+            if (key := find_representative(path)) in groups:
                 groups[key].bodies.append(path)
         # An articulation may contain several groups that are attached to the world.
         merged: dict[str, list[_Articulation]] = {}
@@ -816,7 +834,7 @@ class _StageReader:
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
                 continue  # A single body that is fixed to the world is not a robot.
-            self._set_path(group)
+            self._set_articulation_path(group)
             merged.setdefault(self._find_root(group) or group.path, []).append(group)
         articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
         paths = Counter(group.path for group in articulations)
@@ -825,7 +843,7 @@ class _StageReader:
                 group.path = self._find_root(group) or group.bodies[0]
         return articulations
 
-    def _set_path(self, group: _Articulation) -> None:
+    def _set_articulation_path(self, group: _Articulation) -> None:
         for edge in group.edges:
             if edge.prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 group.path = edge.path
@@ -901,13 +919,15 @@ class _StageReader:
                     self._report_loop(edge)
                     continue
                 reached.add(there)
-                edge.name = make_unique(edge.name, self._joint_names)
+                edge.name = make_unique(edge.name, self._used_joint_names)
                 ordered.append((edge, backwards))
                 open_.append(there)
-        links: dict[str | None, str] = {None: make_unique("world", self._link_names)} if root is None else {}
+        links: dict[str | None, str] = (
+            {None: make_unique("world", self._used_link_names)} if root is None else {}
+        )
         for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
             if path is not None:
-                links[path] = make_unique(self._shorten(path), self._link_names)
+                links[path] = make_unique(self._make_link_name(path), self._used_link_names)
         rows = [row for edge, back in ordered for row in self._make_joints(edge, links, backwards=back)]
         rules = dict(self._resolve_mimic_rules([edge for edge, _ in ordered]))
         rows = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in rows]
@@ -917,15 +937,15 @@ class _StageReader:
                 self._report("outside-joint", edge.path, what)
         prims = {link: path for path, link in links.items() if path is not None}
         for path, parent in self._find_frames(list(prims.values())):
-            link = make_unique(path.rpartition("/")[2], self._link_names)
+            link = make_unique(path.rpartition("/")[2], self._used_link_names)
             try:
                 T = inverse(self._bodies[parent].T) @ self._world_pose(self.stage.GetPrimAtPath(path))[0]
             except InputError as error:
                 self._report("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
                 continue
-            joint = make_fixed_joint(make_unique(f"{link}_fixed", self._joint_names), T)
+            joint = make_fixed_joint(make_unique(f"{link}_fixed", self._used_joint_names), T)
             bounds = self._rounding_of_transforms(path, parent, joint.length)
-            self._single_precision[joint.name] = *bounds, joint.length, 0.0, 0.0
+            self._single_rounding_terms[joint.name] = *bounds, joint.length, 0.0, 0.0
             rows.append((joint, links[parent], link))
             prims[link] = path
         self._joints_read = {edge.path: self._joints_read[edge.path] for edge, _ in ordered}
@@ -944,7 +964,7 @@ class _StageReader:
         below = [end == group.path or end.startswith(inside) for end in edge.ends if end is not None]
         return len(set(below)) > 1
 
-    def _shorten(self, path: str) -> str:
+    def _make_link_name(self, path: str) -> str:
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -960,7 +980,7 @@ class _StageReader:
         name, here, there = edge.name, links[parent], links[child]
         mimic_error = SINGLE_ROUNDOFF if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
         lever = float(np.linalg.norm(B[:3, 3]))
-        self._single_precision[name] = *edge.rounding, edge.length_sum, mimic_error, lever
+        self._single_rounding_terms[name] = *edge.rounding, edge.length_sum, mimic_error, lever
         if kind is JointKind.FIXED:
             yield make_fixed_joint(name, A @ inverse(B)), here, there
             return
@@ -985,9 +1005,13 @@ class _StageReader:
         # In a URDF, joint and child link have the same frame.
         # If a USD joint's frame is not its child's, the joint moves an additional link.
         # A fixed joint connects the additional link with the child link.
-        between = make_unique(f"{name}_link", self._link_names)
+        between = make_unique(f"{name}_link", self._used_link_names)
         yield joint, here, between
-        yield make_fixed_joint(make_unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
+        yield (
+            make_fixed_joint(make_unique(f"{there}_fixed", self._used_joint_names), inverse(B)),
+            between,
+            there,
+        )
 
     def _make_limit(self, edge: _JointPrim) -> Limit | None:
         lower, upper = edge.limits
@@ -1002,33 +1026,35 @@ class _StageReader:
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         turns = edge.kind is JointKind.REVOLUTE
-        if turns and _NEGLIGIBLE_DEGREES < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
+        if turns and _NEGLIGIBLE_LIMIT_DEGREES < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            absent, value = "limits", f"+-{SLIDE_LIMIT:g}"
+            absent, value = "limits", f"+-{FALLBACK_PRISMATIC_LIMIT:g}"
             if math.isfinite(lower) or math.isfinite(upper):
                 absent, value = ("an upper limit", "+") if math.isfinite(lower) else ("a lower limit", "-")
-                value += f"{SLIDE_LIMIT:g}"
+                value += f"{FALLBACK_PRISMATIC_LIMIT:g}"
             what = f"a prismatic joint without {absent} gets {value} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
-            lower, upper = (x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper))
+            lower, upper = (
+                x if math.isfinite(x) else math.copysign(FALLBACK_PRISMATIC_LIMIT, x) for x in (lower, upper)
+            )
         return Limit(lower, upper, rate, math.inf)
 
     def _find_frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield the path of each Xform prim that becomes a link, with the path of the body above the prim."""
         body_api, shape = self.pxr.UsdPhysics.RigidBodyAPI, self.pxr.UsdGeom.Gprim
 
-        def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
+        def find_child_frames(prim: Any, body: str) -> Iterator[tuple[str, str]]:
             for child in prim.GetChildren():
                 is_expanded = str(child.GetPath()) in self.expanded_instances
                 if child.HasAPI(body_api) or child.IsInstance() or is_expanded:
                     continue
                 kind = child.GetTypeName()
                 if kind == "Scope":
-                    yield from below(child, body)
-                if kind != "Xform" or child.GetName().lower() in _SHAPE_GROUPS:
+                    yield from find_child_frames(child, body)
+                if kind != "Xform" or child.GetName().lower() in _SHAPE_XFORM_NAMES:
                     continue
                 inside = self.pxr.Usd.PrimRange(child, self.pxr.Usd.TraverseInstanceProxies())
                 groups_shapes = (
@@ -1038,10 +1064,10 @@ class _StageReader:
                 )
                 if not groups_shapes:
                     yield str(child.GetPath()), body
-                    yield from below(child, body)
+                    yield from find_child_frames(child, body)
 
         for body in bodies:
-            yield from below(self.stage.GetPrimAtPath(body), body)
+            yield from find_child_frames(self.stage.GetPrimAtPath(body), body)
 
     # -- mimic joints --------------------------------------------------------------------------------
 
@@ -1123,10 +1149,10 @@ class _StageReader:
                 self._report("loose-body", path, what, "add a joint, or remove PhysicsRigidBodyAPI")
 
     def _find_rest_configuration(
-        self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
+        self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest_poses: FloatArray
     ) -> FloatArray:
         q = np.zeros(tree.nq)
-        placed = dict(zip(links.values(), rest, strict=True))
+        placed = dict(zip(links.values(), rest_poses, strict=True))
         values = {}
         for edge in group.edges:
             (A, B), (first, second) = edge.frames, edge.ends
@@ -1147,16 +1173,16 @@ class _StageReader:
                 q[at] = values[by_name[joint.name]]
         return q
 
-    def _report_unit_and_up_axis(self, rest: FloatArray) -> None:
+    def _report_unit_and_up_axis(self, rest_poses: FloatArray) -> None:
         if not self.stage.HasAuthoredMetadata("metersPerUnit"):
-            size = float(np.ptp(rest[:, :3, 3], axis=0).max(initial=0.0))
+            size = float(np.ptp(rest_poses[:, :3, 3], axis=0).max(initial=0.0))
             what = f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m"
             self._report("unit-scale", "", what, "write metersPerUnit = 1 if lengths are metres")
         if not self.stage.HasAuthoredMetadata("upAxis"):
             what = f"the stage has no upAxis, so {self.pxr.UsdGeom.GetStageUpAxis(self.stage)} is up"
             self._report("up-axis", "", what, 'write upAxis = "Z"')
 
-    def _report_layers(self, paths: Sequence[str]) -> None:
+    def _report_layer_differences(self, paths: Sequence[str]) -> None:
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1166,31 +1192,35 @@ class _StageReader:
                 if layer not in known:
                     known.add(layer)
                     name = os.path.relpath(layer.identifier, Path(root.realPath).parent)
-                    self._report_layer(layer.pseudoRoot, name, prim)
+                    self._report_layer_difference(layer.pseudoRoot, name, prim)
 
-    def _report_layer(self, root: Any, name: str, prim: Any) -> None:
+    def _report_layer_difference(self, layer_root: Any, name: str, prim: Any) -> None:
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
-        if root.HasInfo(tokens.metersPerUnit):
-            unit = float(root.GetInfo(tokens.metersPerUnit))
+        if layer_root.HasInfo(tokens.metersPerUnit):
+            unit = float(layer_root.GetInfo(tokens.metersPerUnit))
             factor = unit / self._meters_per_unit
-            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._is_scaled(prim, factor):
+            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._has_scale(prim, factor):
                 what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._meters_per_unit:g}"
                 remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
-        if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
-            what = f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up}"
+        if (
+            layer_root.HasInfo(tokens.upAxis)
+            and layer_root.GetInfo(tokens.upAxis) != up
+            and not self._has_units_resolve(prim)
+        ):
+            what = f"the layer {name} has upAxis {layer_root.GetInfo(tokens.upAxis)}, but the stage {up}"
             remedy = "rotate this prim, or save the layer with the up axis of the stage"
             self._report("up-axis", path, f"{what}; the layer is not rotated", remedy)
 
-    def _is_scaled(self, prim: Any, factor: float) -> bool:
+    def _has_scale(self, prim: Any, factor: float) -> bool:
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool(
             (np.abs(scale - 1.0) <= _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount).all()
         )
 
-    def _is_resolved(self, prim: Any) -> bool:
+    def _has_units_resolve(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):

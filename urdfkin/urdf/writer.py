@@ -95,7 +95,7 @@ def escape_attribute(text: str) -> str:
 _INVALID_CHARACTER = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-_INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
+_INDENTATION_PATTERN = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
 def make_attribute_edits(data: bytes, target: Element, values: Mapping[str, str]) -> Iterator[Edit]:
@@ -116,7 +116,7 @@ def make_attribute_edits(data: bytes, target: Element, values: Mapping[str, str]
         yield Edit(last, last, added)
 
 
-def make_insertion(data: bytes, target: Element, element: str) -> Edit:
+def make_insertion_before_element(data: bytes, target: Element, element: str) -> Edit:
     """Return the edit that inserts the text `element` before `target`, with the same indentation."""
-    indentation = _INDENTATION.search(data[max(0, target.offset - 1000) : target.offset])
+    indentation = _INDENTATION_PATTERN.search(data[max(0, target.offset - 1000) : target.offset])
     return Edit(target.offset, target.offset, element + (indentation[1].decode() if indentation else ""))

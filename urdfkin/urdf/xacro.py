@@ -79,17 +79,17 @@ def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> P
 
 #: Maximum time of an expansion (s).
 #: A macro may call itself without end.
-PATIENCE = 60.0
+EXPANSION_TIMEOUT = 60.0
 
 #: Maximum size of the expanded URDF in bytes.
-MOST = 100_000_000
+MAX_EXPANDED_BYTES = 100_000_000
 
 
 class XacroError(UrdfkinError):
     pass
 
 
-def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIENCE) -> bytes:
+def expand(path: Path, arguments: Mapping[str, str], *, timeout: float = EXPANSION_TIMEOUT) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
     Raise SourceError for a missing file, UnknownNameError for an undeclared argument, and XacroError if
@@ -104,11 +104,15 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     command = python_command(
         "from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8")
     )
-    output, status = run_python(command, _make_request(path.absolute(), arguments, patience), patience, MOST)
+    output, status = run_python(
+        command, _make_request(path.absolute(), arguments, timeout), timeout, MAX_EXPANDED_BYTES
+    )
     if status is None:
-        raise XacroError("xacro did not finish", where=str(path), found=f"{patience:g} s")
-    if len(output) > MOST:
-        raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
+        raise XacroError("xacro did not finish", where=str(path), found=f"{timeout:g} s")
+    if len(output) > MAX_EXPANDED_BYTES:
+        raise XacroError(
+            "the expanded URDF is too long", where=str(path), found=f"more than {MAX_EXPANDED_BYTES} bytes"
+        )
     answer = _parse_answer(output)
     if "urdf" in answer:
         if isinstance(names := answer.get("arguments"), list):  # The process is not trusted.
@@ -128,7 +132,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     )
 
 
-def _make_request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
+def _make_request(path: Path, arguments: Mapping[str, str], timeout: float) -> bytes:
     paths = {
         name: [str(folder.absolute()) for folder in search_path(name)] for name in PACKAGE_PATH_VARIABLES
     }
@@ -138,7 +142,7 @@ def _make_request(path: Path, arguments: Mapping[str, str], patience: float) -> 
         "arguments": dict(arguments),
         "search": {name: os.pathsep.join(folders) for name, folders in paths.items()},
         "allowed_paths": asdict(AllowedPaths.of_file(path, installed, list(arguments.values()))),
-        "seconds": ceil(patience) + 1,
+        "seconds": ceil(timeout) + 1,
     }
     return json.dumps(request).encode()
 

@@ -18,7 +18,7 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.system.documents import as_json_data
 from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import get_hook
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Timings
 from urdfkin.validation.document import VALIDATION, Document, RunOutcome, ValidationVerdict, outcome
@@ -277,6 +277,6 @@ def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
 
 
 def _source_words(origins: Sequence[Origin]) -> str:
-    if tuple(origin.source for origin in origins) == example_robots():
+    if tuple(origin.source for origin in origins) == example_robot_data_names():
         return "--all"
     return shlex.join(origin.source_argument for origin in origins)

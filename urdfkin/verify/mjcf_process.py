@@ -144,8 +144,8 @@ def _make_answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
         answer |= {
             "q": pack_array(q),
             "placements": pack_array(read.placements(q)[..., :3, :]),
-            "lengths": pack_array(read.distance_bounds(q)),
-            "angles": pack_array(read.reference_angles(q)),
+            "lengths": pack_array(read.origin_distance_bounds(q)),
+            "angles": pack_array(read.hinge_angle_sums(q)),
             "residuals": pack_array(read.residuals(q)),
             "rule_sizes": pack_array(read.rule_scales(q)),
         }

@@ -168,7 +168,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: `urdfkin.urdf.usd.Usd.single_precision` defines the five numbers.
+#: `urdfkin.urdf.usd.Usd.single_rounding_terms` defines the five numbers.
 SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
 

@@ -47,7 +47,7 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
     )
     return {
         "urdf": to_urdf(read.tree),
-        "single": read.single_precision,
+        "single": read.single_rounding_terms,
         "remarks": [astuple(one) for one in read.remarks],
         "prims": read.prims,
         "rest": pack_array(read.rest_poses[:, :3]),

@@ -13,7 +13,7 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.findings import Reporter
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check, check_text
 from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, format_summary
-from urdfkin.urdf.lint.pages import RULES
+from urdfkin.urdf.lint.pages import URDF_RULES
 from urdfkin.urdf.lint.runner import read_urdf
 
 FINDING = Finding(
@@ -87,7 +87,7 @@ def test_sarif_conforms_to_the_official_schema_and_each_result_has_its_rule(find
     validator.validate(log)
     (run,) = log["runs"]
     rules = run["tool"]["driver"]["rules"]
-    assert [rule["id"] for rule in rules] == list(RULES)
+    assert [rule["id"] for rule in rules] == list(URDF_RULES)
     assert [rules[result["ruleIndex"]]["id"] for result in run["results"]] == [one.code for one in findings]
     run["results"][0]["locations"][0]["physicalLocation"]["region"]["startLine"] = 0
     with pytest.raises(jsonschema.ValidationError):

@@ -17,10 +17,19 @@ from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, Rule
 from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, SizeLimits, check, rules
-from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
+from urdfkin.urdf.lint.pages import (
+    TOPICS,
+    URDF_RULES,
+    Page,
+    explain,
+    find_rule,
+    page,
+    page_file_by_topic,
+    topic_pages,
+)
 
 HERE = Path(rules.__file__).parent
-EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: rule.id)
+EVERY_RULE = pytest.mark.parametrize("rule", URDF_RULES.values(), ids=lambda rule: rule.id)
 
 
 #: Limits with which the examples of some rules are checked.
@@ -79,7 +88,7 @@ def test_codes_and_texts_of_rules_have_the_required_form_and_pages_fit_a_termina
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_file_of_pages_has_a_page_for_each_rule_in_order_and_no_other_content(topic: str) -> None:
     assert list(topic_pages(topic)) == [rule.id for rule in TOPICS[topic]]
-    data = tomllib.loads(page_files()[topic].read_text("utf-8"))
+    data = tomllib.loads(page_file_by_topic()[topic].read_text("utf-8"))
     known = {field.name for field in fields(Page)} | {"parts"}
     assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {
         "correction",
@@ -94,13 +103,13 @@ def test_every_module_of_rules_has_a_file_of_pages() -> None:
     topics = {*TOPICS, "left_out"}
     assert {path.stem for path in HERE.glob("*.py")} - {"__init__"} == topics - {"parser"}
     assert {path.stem for path in HERE.glob("*.toml")} == topics - {"parser"}
-    assert all(file.is_file() for file in page_files().values())
-    assert page_files().keys() == topics
-    assert sum(map(len, TOPICS.values())) == len(RULES)
+    assert all(file.is_file() for file in page_file_by_topic().values())
+    assert page_file_by_topic().keys() == topics
+    assert sum(map(len, TOPICS.values())) == len(URDF_RULES)
 
 
 def test_a_rule_is_found_by_its_code_its_digits_and_its_unique_short_name() -> None:
-    assert len({rule.slug for rule in RULES.values()}) == len(RULES)
+    assert len({rule.slug for rule in URDF_RULES.values()}) == len(URDF_RULES)
     assert find_rule("urdf502") is find_rule("502") is find_rule("Axis-Without-Direction")
     with pytest.raises(UnknownNameError, match="did you mean"):
         find_rule("URDF5O2")
@@ -108,7 +117,7 @@ def test_a_rule_is_found_by_its_code_its_digits_and_its_unique_short_name() -> N
 
 @pytest.fixture(scope="module")
 def verdicts() -> dict[str, dict[str, str]]:
-    return dict(zip(RULES, ask([document(page(code).example) for code in RULES]), strict=True))
+    return dict(zip(URDF_RULES, ask([document(page(code).example) for code in URDF_RULES]), strict=True))
 
 
 @pytest.mark.slow

@@ -134,7 +134,7 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     equal = {
         "name, type, parent or child": names_a == names_b,
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
-        "orientation": rotation <= Fraction(max_rotation) * _SLACK,
+        "orientation": rotation <= Fraction(max_rotation) * _ROTATION_SUM_FACTOR,
         "axis": a.kind not in AXIAL_TYPES or _same_direction(a.axis, b.axis),
         "limit": _effective_limits(a) == _effective_limits(b),
         "mimic": a.kind == "fixed" or _mimic_rule(a) == _mimic_rule(b),
@@ -143,7 +143,7 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
 
 
 #: Factor that covers the rounding errors in the sum of rotations `max_rotation`.
-_SLACK = 1 + Fraction(1, 2**50)
+_ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
@@ -172,10 +172,10 @@ def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
 
 
 #: Bytes per line of git's binary patch.
-_BYTES_IN_A_LINE = 52
+_PATCH_BYTES_PER_LINE = 52
 #: First letters of the lines in git's binary patch.
 #: A letter encodes the number of bytes of the line.
-_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
+_PATCH_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def make_patch(file: str, before: bytes, after: bytes, escape: Callable[[str], str]) -> str:
@@ -197,7 +197,7 @@ def _relative_path(file: str) -> str:
 
 def _make_unified_diff(name: str, before: bytes, after: bytes) -> str:
     end = "\t" if " " in name else ""  # Git needs a tab after a file name that contains spaces.
-    old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
+    old, new = (f"{_quote_file_name(f'{side}/{name}')}{end}" for side in "ab")
     # Like git, StringIO ends lines only at line feeds.
     a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
     found = difflib.unified_diff(a, b, old, new)
@@ -205,7 +205,7 @@ def _make_unified_diff(name: str, before: bytes, after: bytes) -> str:
     return "".join(line if line.endswith("\n") else line + no_end for line in found)
 
 
-def _quote(name: str) -> str:
+def _quote_file_name(name: str) -> str:
     if name.isascii() and name.isprintable() and not set(name) & {'"', "\\"}:
         return name
     return '"' + "".join(
@@ -218,7 +218,7 @@ def _make_binary_patch(name: str, before: bytes, after: bytes) -> str:
     here = Path.cwd()
     top = next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
     place = os.path.relpath(name, top)
-    old, new = (_quote(f"{side}/{Path(place).as_posix()}") for side in "ab")
+    old, new = (_quote_file_name(f"{side}/{Path(place).as_posix()}") for side in "ab")
     digests = (hashlib.sha1(b"blob %d\0" % len(data) + data).hexdigest() for data in (before, after))
     head = f"diff --git {old} {new}\nindex {'..'.join(digests)}\nGIT binary patch\n"
     return head + "".join(f"literal {len(data)}\n{_encode(data)}\n" for data in (after, before))
@@ -226,7 +226,8 @@ def _make_binary_patch(name: str, before: bytes, after: bytes) -> str:
 
 def _encode(data: bytes) -> str:
     packed = zlib.compress(data)
-    pieces = (packed[i : i + _BYTES_IN_A_LINE] for i in range(0, len(packed), _BYTES_IN_A_LINE))
+    pieces = (packed[i : i + _PATCH_BYTES_PER_LINE] for i in range(0, len(packed), _PATCH_BYTES_PER_LINE))
     return "".join(
-        f"{_LENGTH_LETTERS[len(piece) - 1]}{base64.b85encode(piece, pad=True).decode()}\n" for piece in pieces
+        f"{_PATCH_LENGTH_LETTERS[len(piece) - 1]}{base64.b85encode(piece, pad=True).decode()}\n"
+        for piece in pieces
     )

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from urdfkin.urdf.findings import Finding, Fix, Rule, Severity, count_by_severity, format_counts
-from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, RULES, find_rule, page
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, URDF_RULES, find_rule, page
 
 SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
@@ -26,7 +26,7 @@ def as_sarif(
 ) -> str:
     """Return a SARIF document with all rules about URDF files, and a result for each finding."""
     codes = {finding.code for finding in findings}
-    rules = RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
+    rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
     results = [_result(finding, index[finding.code]) for finding in findings]
     for finding, reason in silenced_findings:
@@ -49,10 +49,10 @@ def _rule(rule: Rule) -> dict[str, Any]:
     }
 
 
-def _result(finding: Finding, rule: int) -> dict[str, Any]:
+def _result(finding: Finding, rule_index: int) -> dict[str, Any]:
     result: dict[str, Any] = {
         "ruleId": finding.code,
-        "ruleIndex": rule,
+        "ruleIndex": rule_index,
         "level": finding.severity.value,
         "message": {"text": finding.sentence},
         "locations": [_location(finding)],
@@ -134,13 +134,13 @@ def as_json(
         "urdfkin": version,
         "files": list(files),
         "counts": count_by_severity(findings),
-        "findings": [_entry(finding) for finding in findings],
-        "silenced": [_entry(finding) | {"reason": reason} for finding, reason in silenced_findings],
+        "findings": [_json_entry(finding) for finding in findings],
+        "silenced": [_json_entry(finding) | {"reason": reason} for finding, reason in silenced_findings],
     }
     return json.dumps(document, indent=2)
 
 
-def _entry(finding: Finding) -> dict[str, Any]:
+def _json_entry(finding: Finding) -> dict[str, Any]:
     fix = None if finding.fix is None else asdict(finding.fix)
     return finding.as_dict() | {"width": finding.width, "fix": fix, "title": page(finding.code).title}
 
@@ -148,19 +148,19 @@ def _entry(finding: Finding) -> dict[str, Any]:
 def as_github(findings: Sequence[Finding]) -> str:
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
-        f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"
-        f"{_end(f)}title={_property(f.code)}::{_message(f.sentence)}"
+        f"::{words[f.severity]} file={_escape_property(f.file)},line={f.line},col={f.column},"
+        f"{_end_column_text(f)}title={_escape_property(f.code)}::{_escape_message(f.sentence)}"
         for f in sorted(findings, key=lambda f: f.severity.rank)
     )
 
 
-def _end(finding: Finding) -> str:
+def _end_column_text(finding: Finding) -> str:
     return f"endColumn={finding.column + finding.width}," if finding.width > 1 else ""
 
 
-def _message(text: str) -> str:
+def _escape_message(text: str) -> str:
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _property(text: str) -> str:
-    return _message(text).replace(":", "%3A").replace(",", "%2C")
+def _escape_property(text: str) -> str:
+    return _escape_message(text).replace(":", "%3A").replace(",", "%2C")

@@ -27,21 +27,21 @@ from urdfkin.urdf.lint.rules import bodies, dialect, joints, left_out
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
-_MODULES = (parser, dialect, joints, bodies)
+_RULE_MODULES = (parser, dialect, joints, bodies)
 
 #: The rules about URDF files, indexed by module name.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
-    for module in _MODULES
+    for module in _RULE_MODULES
 }
 
-RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
+URDF_RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
 #: The rules about MJCF and USD files.
 MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
 CODE_BY_NAME = {
-    word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
+    word: rule.id for rule in URDF_RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
 }
 
 _TOPIC_OF_CODE = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
@@ -71,10 +71,12 @@ def page(code: str) -> Page:
     return topic_pages(_TOPIC_OF_CODE[code])[code]
 
 
-def page_files() -> dict[str, Traversable]:
+def page_file_by_topic() -> dict[str, Traversable]:
     from importlib import resources
 
-    packages = {module.__name__.rpartition(".")[2]: module.__package__ for module in (*_MODULES, left_out)}
+    packages = {
+        module.__name__.rpartition(".")[2]: module.__package__ for module in (*_RULE_MODULES, left_out)
+    }
     return {topic: resources.files(str(package)) / f"{topic}.toml" for topic, package in packages.items()}
 
 
@@ -82,7 +84,7 @@ def page_files() -> dict[str, Traversable]:
 def topic_pages(topic: str) -> dict[str, Page]:
     import tomllib
 
-    data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
+    data = tomllib.loads(page_file_by_topic()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {
         code: _make_page({**data, **defaults, **data[code]})
@@ -108,7 +110,7 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    known, name = RULES | MJCF_AND_USD_RULES, word.strip().lower()
+    known, name = URDF_RULES | MJCF_AND_USD_RULES, word.strip().lower()
     codes = CODE_BY_NAME | {
         name: rule.id for rule in MJCF_AND_USD_RULES.values() for name in (rule.id.lower(), rule.slug)
     }
@@ -125,7 +127,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     """
     prefix = word.strip().upper()
     prefix = f"URDF{prefix}" if prefix.isdigit() else prefix
-    every = RULES | MJCF_AND_USD_RULES
+    every = URDF_RULES | MJCF_AND_USD_RULES
     family = tuple(rule for rule in every.values() if rule.id.startswith(prefix))
     if prefix == "ALL":
         return tuple(every.values())

@@ -41,11 +41,11 @@ from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 #: The number changes if a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
-Key = tuple[str, ...]
-_FIELDS = ("file", "code", "severity", "element", "name", "found")
+BaselineKey = tuple[str, ...]
+_BASELINE_FIELDS = ("file", "code", "severity", "element", "name", "found")
 
 
-def key_of(finding: Finding, file: str) -> Key:
+def baseline_key(finding: Finding, file: str) -> BaselineKey:
     words = (finding.severity.value, finding.element or "", finding.name or "", finding.found or "")
     return (file, finding.code, *words)
 
@@ -59,12 +59,12 @@ class Baseline:
     found.
     """
 
-    counts: Counter[Key]
+    counts: Counter[BaselineKey]
     root: Path = field(default_factory=Path)
     match_count: int = 0
 
     def consume(self, finding: Finding) -> bool:
-        key = key_of(finding, relative_path(finding.file, self.root))
+        key = baseline_key(finding, relative_path(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
         self.counts[key] -= 1
@@ -86,13 +86,13 @@ def relative_path(file: str, root: Path) -> str:
 
 def read_baseline(path: Path) -> Baseline:
     """Read a baseline; raise InputError if the file is not a baseline."""
-    counts = Counter[Key]()
+    counts = Counter[BaselineKey]()
     try:
         document = json.loads(read_text(path))
         if document["schema"] != "urdfkin-baseline" or document["version"] != BASELINE_VERSION:
             raise ValueError
         for entry in document["findings"]:
-            counts[tuple(str(entry[name]) for name in _FIELDS)] = int(entry["count"])
+            counts[tuple(str(entry[name]) for name in _BASELINE_FIELDS)] = int(entry["count"])
     except (ValueError, TypeError, LookupError, RecursionError):
         remedy = "write a baseline with: urdfkin check --write-baseline FILE ..."
         raise InputError("this file is not a baseline of urdfkin", where=str(path), remedy=remedy) from None
@@ -105,13 +105,15 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     If the file `path` contains an older baseline, the function also copies entries of the older baseline. The
     function does not copy entries about a file in `files` or about a deleted file.
     """
-    counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
+    counts = Counter(baseline_key(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
         checked = {relative_path(file, path.parent) for file in files}
         older = read_baseline(path).counts
         others = [key for key in older if key[0] not in checked and (path.parent / key[0]).exists()]
         counts |= Counter({key: older[key] for key in others})
-    entries = [dict(zip(_FIELDS, key, strict=True)) | {"count": n} for key, n in sorted(counts.items())]
+    entries = [
+        dict(zip(_BASELINE_FIELDS, key, strict=True)) | {"count": n} for key, n in sorted(counts.items())
+    ]
     document = {"schema": "urdfkin-baseline", "version": BASELINE_VERSION, "findings": entries}
     return json.dumps(document, indent=1) + "\n"
 
@@ -229,7 +231,7 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
 
 
 #: Suffixes of files that a xacro file can include.
-_INCLUDABLE_SUFFIXES = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
+_XACRO_INCLUDE_SUFFIXES = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +276,7 @@ def find_known_findings(
     """Return the findings of a file's older version; None for an unchanged file without new findings.
 
     An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
-    If a file with a suffix of `_INCLUDABLE_SUFFIXES` has changed, all findings of the xacro file are new.
+    If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file are new.
     Second, a mesh file that exists in the older version may be missing now. If the URDF contains the
     name of a file deleted since that version, all findings about missing meshes are new.
     """
@@ -286,7 +288,7 @@ def find_known_findings(
         # All findings count as new after a change of the xacro file.
         # The same applies to files that the xacro file may include.
         is_new = not version.contains(read_bytes(path))
-        return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
+        return Baseline(Counter()) if is_new or version.has_changes(_XACRO_INCLUDE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
     old_data = text.data if is_unchanged else version.read_file(path)
     findings = () if old_data is None else examine(replace(text, data=old_data)).findings
@@ -294,11 +296,13 @@ def find_known_findings(
         findings = tuple(finding for finding in findings if finding.code != MESH_MISSING.id)
     elif is_unchanged:
         return None
-    return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in findings))
+    return Baseline(
+        Counter(baseline_key(finding, relative_path(finding.file, Path())) for finding in findings)
+    )
 
 
 #: urdfkin and ROS's build tools skip folders with one of these files.
-IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+FOLDER_IGNORE_FILES = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def find_files(
@@ -315,7 +319,7 @@ def find_files(
         files = sorted(_walk_folder(path, settings.root, include, exclude))
         remedy = f"searched for {', '.join(include)}, except in hidden and excluded folders"
     elif glob.has_magic(argument) and not may_exist(path):
-        files = [file for file in _expand_pattern(argument) if not matches(file, exclude, settings.root)]
+        files = [file for file in _find_matching_files(argument) if not matches(file, exclude, settings.root)]
         remedy = None
     else:
         return [f"./{argument}" if argument.lstrip().startswith("<") else argument]
@@ -326,7 +330,7 @@ def find_files(
 
 def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[str]) -> Iterator[str]:
     for here, folders, files in os.walk(folder):
-        if any(name in IGNORE_MARKERS for name in files):
+        if any(name in FOLDER_IGNORE_FILES for name in files):
             folders.clear()
             continue
         place = Path(here)
@@ -339,7 +343,7 @@ def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequ
         yield from (unambiguous_path(file) for file in named if not matches(str(file), exclude, root))
 
 
-def _expand_pattern(pattern: str) -> list[str]:
+def _find_matching_files(pattern: str) -> list[str]:
     # Path.glob does not accept absolute patterns.
     names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207  Path.glob() refuses some patterns
     return sorted(unambiguous_path(name) for name in names if not is_folder(name))

@@ -32,11 +32,11 @@ NEGLIGIBLE_MOMENT = 1e-9
 #: Exporters write moments of inertia with few digits.
 _MOMENT_PRECISION = 1e-6
 
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def check_inertials(report: Reporter, robot: RobotRecord) -> None:
-    numbers = NumberReader(report, UNREADABLE, UNREADABLE)
+    numbers = NumberReader(report, UNREADABLE_NUMBER, UNREADABLE_NUMBER)
     for link in robot.links.values():
         inertial = link.find("inertial")
         if inertial is not None:
@@ -49,26 +49,26 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     if mass_element is not None and "value" not in mass_element.attributes:
         missing.append("value of <mass>")
     if tensor is not None:
-        missing += [name for name in _MOMENTS if name not in tensor.attributes]
+        missing += [name for name in _INERTIA_ATTRIBUTES if name not in tensor.attributes]
     if missing:
         message = "<inertial> is incomplete"
         remedy = "write <mass> and all six moments of <inertia>, or remove <inertial>"
         report.add(INERTIAL_INCOMPLETE, message, inertial, found=f"no {', '.join(missing)}", remedy=remedy)
-    lever = None
+    centre_of_mass = None
     if origin is not None:
-        lever = numbers.read_vector(origin, "xyz")
+        centre_of_mass = numbers.read_vector(origin, "xyz")
         numbers.read_vector(origin, "rpy")
     mass = None if mass_element is None else numbers.read_scalar(mass_element, "value")
-    _check_mass(report, inertial, mass, lever)
+    _check_mass(report, inertial, mass, centre_of_mass)
     if tensor is not None:
-        read = (numbers.read_scalar(tensor, name) for name in _MOMENTS)
+        read = (numbers.read_scalar(tensor, name) for name in _INERTIA_ATTRIBUTES)
         moments = [moment for moment in read if moment is not None]
-        if len(moments) == len(_MOMENTS):
+        if len(moments) == len(_INERTIA_ATTRIBUTES):
             _check_moments(report, tensor, moments, mass)
 
 
 def _check_mass(
-    report: Reporter, inertial: Element, mass: float | None, lever: tuple[float, ...] | None
+    report: Reporter, inertial: Element, mass: float | None, centre_of_mass: tuple[float, ...] | None
 ) -> None:
     if mass is not None and mass < 0.0:
         report.add(
@@ -81,7 +81,7 @@ def _check_mass(
             weight=1.0,
         )
     heavy = mass is not None and abs(mass) > MAX_MASS
-    distance = max(map(abs, lever or (0.0,)))
+    distance = max(map(abs, centre_of_mass or (0.0,)))
     if heavy or distance > MAX_COORDINATE:
         message = "the mass or the centre of mass is far too large"
         remedy = "write the mass in kilograms and the centre of mass in metres"
@@ -130,8 +130,8 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
     return low * scale, (3.0 * mean - high - low) * scale, high * scale
 
 
-UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
-GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
+UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
+GEOMETRY_INCOMPLETE = Rule("URDF705", "geometry-incomplete", WARNING)
 
 #: Numeric attributes of each shape:
 #: name, count of numbers, and whether the attribute is required.
@@ -145,7 +145,7 @@ _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
 
 
 def check_shapes(report: Reporter, robot: RobotRecord) -> None:
-    numbers = NumberReader(report, UNREADABLE, UNREADABLE)
+    numbers = NumberReader(report, UNREADABLE_NUMBER, UNREADABLE_NUMBER)
     for link in robot.links.values():
         for shape in link.children:
             if shape.tag in ("visual", "collision"):
@@ -163,12 +163,12 @@ def _check_geometry(
     if capsule is not None and version < (1, 1):  # URDF readers skip capsules in files before version 1.1.
         message = 'a capsule needs version="1.1" and is ignored'
         remedy = 'write version="1.1" in <robot>, or use a cylinder and two spheres'
-        report.add(GEOMETRY, message, capsule, remedy=remedy)
+        report.add(GEOMETRY_INCOMPLETE, message, capsule, remedy=remedy)
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None or shape.tag not in _SHAPES:
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
         report.add(
-            GEOMETRY,
+            GEOMETRY_INCOMPLETE,
             f"the {owner.tag} contains no shape that URDF defines",
             geometry or owner,
             found=lacks if shape is None else f"<{shape.tag}>",
@@ -186,12 +186,12 @@ def _check_geometry(
     if shape.tag == "mesh" and not shape.attributes.get("filename", "").strip():
         _report_missing(report, owner, shape, "filename")
     elif shape.tag == "mesh":
-        check_address(report, shape)
+        report_remote_mesh(report, shape)
 
 
 def _report_missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
     message = f"the {shape.tag} of a {owner.tag} has no {attribute}"
-    report.add(GEOMETRY, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
+    report.add(GEOMETRY_INCOMPLETE, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
 
 
 MATERIAL_UNKNOWN = Rule("URDF708", "material-unknown", WARNING)
@@ -262,17 +262,17 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
             folder = packages[package]
             if folder is None:
                 missing.setdefault(package, []).append(mesh)
-            elif not _exists(folder / path):
-                _report_file(report, mesh, filename)
+            elif not _is_existing_file(folder / path):
+                _report_missing_mesh(report, mesh, filename)
         elif _is_missing_file(filename, urdf_path):
-            _report_file(report, mesh, filename)
+            _report_missing_mesh(report, mesh, filename)
     for package, meshes in missing.items():
         remedy = "add the package's folder to ROS_PACKAGE_PATH" if package else "write package://NAME/PATH"
         report.add(
             MESH_MISSING,
-            f"package {quote(package)} of {_count(len(meshes))} is not found"
+            f"package {quote(package)} of {_mesh_count_text(len(meshes))} is not found"
             if package
-            else f"the address of {_count(len(meshes))} names no package",
+            else f"the address of {_mesh_count_text(len(meshes))} names no package",
             meshes[0],
             attribute="filename",
             found=quote(meshes[0].attributes["filename"]),
@@ -280,7 +280,7 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
         )
 
 
-def check_address(report: Reporter, mesh: Element) -> None:
+def report_remote_mesh(report: Reporter, mesh: Element) -> None:
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
         message = "the mesh is on the network and was not downloaded"
@@ -300,21 +300,21 @@ def _is_missing_file(filename: str, urdf_path: Path | None) -> bool:
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if urdf_path is None or not local:
         return False
-    return not _exists(urdf_path.absolute().parent / filename.removeprefix("file://"))
+    return not _is_existing_file(urdf_path.absolute().parent / filename.removeprefix("file://"))
 
 
-def _exists(path: Path) -> bool:
+def _is_existing_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):
         return False
 
 
-def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
+def _report_missing_mesh(report: Reporter, mesh: Element, filename: str) -> None:
     message = "the mesh is not found"
     remedy = "correct the filename, or add the file; kinematics needs no mesh"
     report.add(MESH_MISSING, message, mesh, attribute="filename", found=quote(filename), remedy=remedy)
 
 
-def _count(number: int) -> str:
+def _mesh_count_text(number: int) -> str:
     return "a mesh" if number == 1 else f"{number} meshes"

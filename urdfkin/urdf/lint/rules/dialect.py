@@ -30,13 +30,13 @@ from urdfkin.urdf.records import Element, RobotRecord
 INCLUDE = Rule("URDF112", "include", ERROR)
 XACRO = Rule("URDF202", "unexpanded-xacro", ERROR)
 NO_LINKS = Rule("URDF205", "no-links", ERROR)
-NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
+DEFAULT_NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 #: Elements of SRDF files, which supplement a URDF.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
-_COMMAND = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
+_SUBSTITUTION = re.compile(r"\$\((find|arg|env|optenv|eval|anon|dirname)\b")
 _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 
@@ -60,7 +60,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
     if "xmlns" in root.attributes:
         message = "xmlns puts the elements into a namespace; readers that support namespaces find no links"
         found = quote(root.attributes["xmlns"])
-        report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
+        report.add(DEFAULT_NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
     namespaces = {
         key.removeprefix("xmlns:"): value
         for element in root.walk()
@@ -68,7 +68,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
         if key.startswith("xmlns:")
     }
     xacro = {prefix for prefix, uri in namespaces.items() if _XACRO_NAMESPACE.match(uri)} | {"xacro"}
-    macros: list[_Occurrence] = []
+    macros: list[_ElementOrAttribute] = []
     for element in root.walk():
         prefix, _, local = element.tag.rpartition(":")
         if prefix in xacro:
@@ -79,16 +79,16 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
     # Only xacro elements directly inside <robot>, or anywhere inside <joint>, can change kinematics.
     if _report_xacro(
-        report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
+        report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_level_element.tag == "joint"
     ):
         return
-    expressions: list[_Occurrence] = [
+    expressions: list[_ElementOrAttribute] = [
         (element, key)
         for element in walk_outside_extensions(root)
         for key, value in element.attributes.items()
         if "$" in value and is_expression(value) and not key.startswith("xmlns")
     ]
-    _report_xacro(report, "xacro expression", expressions, _is_used)
+    _report_xacro(report, "xacro expression", expressions, _affects_kinematics)
 
 
 _EXPAND_REMEDY = (
@@ -97,15 +97,18 @@ _EXPAND_REMEDY = (
 
 #: An element and the name of an attribute.
 #: The name None means the element itself.
-_Occurrence = tuple[Element, str | None]
+_ElementOrAttribute = tuple[Element, str | None]
 
 
 def _report_xacro(
-    report: Reporter, what: str, places: Sequence[_Occurrence], is_used: Callable[[Element], bool]
+    report: Reporter,
+    what: str,
+    places: Sequence[_ElementOrAttribute],
+    affects_kinematics: Callable[[Element], bool],
 ) -> bool:
     """Report unexpanded xacro in `places`; return whether kinematics uses any element of `places`."""
-    used = [place for place in places if is_used(place[0])]
-    unused = [place for place in places if not is_used(place[0])]
+    used = [place for place in places if affects_kinematics(place[0])]
+    unused = [place for place in places if not affects_kinematics(place[0])]
     for group, severity, message in (
         (used, None, f"unexpanded {what}"),
         (unused, Severity.WARNING, f"unexpanded {what}, which kinematics does not use"),
@@ -123,8 +126,10 @@ def _report_xacro(
     return bool(used)
 
 
-def _is_used(element: Element) -> bool:
-    return element.top_element.tag == "joint" or (element.top_element is element and element.tag == "link")
+def _affects_kinematics(element: Element) -> bool:
+    return element.top_level_element.tag == "joint" or (
+        element.top_level_element is element and element.tag == "link"
+    )
 
 
 def _count_more(group: Sequence[object]) -> str:
@@ -133,7 +138,7 @@ def _count_more(group: Sequence[object]) -> str:
 
 def is_expression(value: str) -> bool:
     start = value.find("${")
-    return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
+    return (start >= 0 and "}" in value[start:]) or _SUBSTITUTION.search(value) is not None
 
 
 MISPLACED = Rule("URDF206", "misplaced-element", ERROR)
@@ -143,14 +148,16 @@ DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
 #: Extension elements may contain anything, even `<joint>` and `<link>`.
-OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
+EXTENSION_ELEMENTS = frozenset(
+    {"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"}
+)
 
 #: Common elements and attributes of simulators and vendors.
-_COMMON_EXTENSIONS = (
+_VENDOR_NAMES_TEXT = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
-EXTENSIONS = frozenset(_COMMON_EXTENSIONS.split())
+VENDOR_NAMES = frozenset(_VENDOR_NAMES_TEXT.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: If a line has no colon, the attributes of the element are not checked.
@@ -182,11 +189,11 @@ ATTRIBUTES = {
 }
 
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
-_POSE_NAMES_ELSEWHERE = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
+_POSE_NAMES_OF_OTHER_FORMATS = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Names that URDF, a simulator or another format defines.
 #: `--fix` does not remove attributes with these names.
-_DEFINED_ELSEWHERE = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_ELSEWHERE | EXTENSIONS
+_KEPT_ATTRIBUTES = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_OF_OTHER_FORMATS | VENDOR_NAMES
 
 #: Child elements that may occur only once.
 _SINGLE_CHILDREN = {
@@ -198,7 +205,7 @@ _SINGLE_CHILDREN = {
 _ELEMENTS_WITHOUT_TEXT = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
 #: Elements whose text probably belongs in an attribute.
-_VECTORS = ("origin", "axis")
+_VECTOR_ELEMENTS = ("origin", "axis")
 
 
 def check_vocabulary(report: Reporter, root: Element) -> None:
@@ -212,7 +219,7 @@ def check_vocabulary(report: Reporter, root: Element) -> None:
         _check_text(report, element)
         _check_repeats(report, element)
         for child in element.children:
-            if child.tag not in known and child.tag not in OPAQUE and ":" not in child.tag:
+            if child.tag not in known and child.tag not in EXTENSION_ELEMENTS and ":" not in child.tag:
                 _check_unknown(report, child, known)
         stack += [child for child in reversed(element.children) if child.tag in known]
 
@@ -226,23 +233,23 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
             what = f"a {meant} inside <{part.parent.tag if part.parent else ''}>"
         message = f"{what} is skipped, so the element is missing from the robot"
         remedy = f"write <{meant}> as a child of <robot>"
-        report.add(MISPLACED, message, part, remedy=remedy, misplaced=True)
+        report.add(MISPLACED, message, part, remedy=remedy, names_element=True)
     if parts:
         return
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
     parent = element.parent
-    if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
+    if parent is not None and parent.tag in _VECTOR_ELEMENTS and element.text and not parent.attributes:
         message, found = f"the value inside <{element.tag}> is skipped", quote(element.text)
         remedy = f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}"
         report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=Severity.ERROR)
         return
     message = f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; the element is skipped"
     remedy = f"did you mean <{close}>?" if close else "remove the element"
-    if element.tag in _POSE_NAMES_ELSEWHERE:
+    if element.tag in _POSE_NAMES_OF_OTHER_FORMATS:
         remedy = f"write {_EXAMPLES['origin']}"
-    elif element.tag in EXTENSIONS:
+    elif element.tag in VENDOR_NAMES:
         remedy = "keep the element if another program needs it"
-    severity = Severity.NOTE if element.tag in EXTENSIONS else None
+    severity = Severity.NOTE if element.tag in VENDOR_NAMES else None
     report.add(UNKNOWN_ELEMENT, message, element, remedy=remedy, severity=severity)
 
 
@@ -252,12 +259,12 @@ def walk_outside_extensions(element: Element) -> Iterator[Element]:
     while stack:
         element = stack.pop()
         yield element
-        stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
+        stack += [child for child in reversed(element.children) if child.tag not in EXTENSION_ELEMENTS]
 
 
 def _is_link_or_joint(element: Element) -> bool:
     """Return whether an element is a link or joint, possibly with a misspelt tag."""
-    tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MAX_TAG_LENGTH else None
+    tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MISSPELT_LENGTH_BOUND else None
     if tag == "link":
         return "name" in element.attributes
     return tag == "joint" and (
@@ -268,7 +275,7 @@ def _is_link_or_joint(element: Element) -> bool:
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
 #: Tags of this length or longer are not a misspelt `link` or `joint`.
-_MAX_TAG_LENGTH = 8
+_MISSPELT_LENGTH_BOUND = 8
 
 
 def _check_attributes(report: Reporter, element: Element) -> None:
@@ -287,9 +294,9 @@ def _check_attributes(report: Reporter, element: Element) -> None:
             attribute=attribute,
             found=f"{attribute}={quote(element.attributes[attribute])}",
             remedy=f"did you mean {close}?" if close else every,
-            severity=Severity.NOTE if attribute in EXTENSIONS else None,
+            severity=Severity.NOTE if attribute in VENDOR_NAMES else None,
             fix=None
-            if close or attribute in _DEFINED_ELSEWHERE
+            if close or attribute in _KEPT_ATTRIBUTES
             else partial(report.make_removal_fix, element, attribute),
         )
 
@@ -299,7 +306,7 @@ def _check_text(report: Reporter, element: Element) -> None:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
         return  # Another finding already quotes this text.
-    lost = element.tag in _VECTORS and not element.attributes
+    lost = element.tag in _VECTOR_ELEMENTS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     message, found = f"text inside <{element.tag}> is skipped", quote(element.text)
     remedy = f"write the value as an attribute, as in {example}" if example else "remove the text"
@@ -344,8 +351,8 @@ def check_prefixes(report: Reporter, root: Element) -> None:
         report.add(UNDECLARED_PREFIX, message, element, attribute=attribute, found=found, remedy=remedy)
 
 
-def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
-    found: dict[str, list[_Occurrence]] = {}
+def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribute]]:
+    found: dict[str, list[_ElementOrAttribute]] = {}
     declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes xml and xmlns.
     stack = [(root, False)]
     while stack:
@@ -358,13 +365,13 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
         if own:
             stack.append((element, True))
         stack += [(child, False) for child in reversed(element.children)]
-        for prefix, attribute in _prefixes_of(element):
+        for prefix, attribute in _find_prefix_uses(element):
             if declared[prefix] < 1:
                 found.setdefault(prefix, []).append((element, attribute))
     return found
 
 
-def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
+def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
     """Yield the namespace prefixes in the attribute names and in the tag of an element.
 
     The second value of a pair is the name of the attribute with the prefix, or None for the prefix of the
@@ -378,9 +385,9 @@ def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
 
 
 RESERVED_NAME = Rule("URDF403", "reserved-name", WARNING)
-UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
+NAME_UNIVERSE = Rule("URDF404", "name-universe", WARNING, DIFFERS)
 ODD_NAME = Rule("URDF405", "odd-name", WARNING)
-NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
+LINE_BREAK_IN_NAME = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
 #: Maximum number of characters of a name; URDF405 reports longer names.
@@ -394,7 +401,7 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
         _check_odd_name(report, name, element)
-        _check_blanks(report, element)
+        _check_line_breaks_in_name(report, element)
         _check_reserved(report, name, element, root_joint)
     for kind in (links, joints):
         _check_lookalikes(report, kind)
@@ -420,18 +427,20 @@ def _check_odd_name(report: Reporter, name: str, element: Element) -> None:
         report.add(ODD_NAME, reason, element, attribute="name", found=quote(name), remedy=remedy)
 
 
-def _check_blanks(report: Reporter, element: Element) -> None:
-    raw_value = report.raw_value(element, "name") if report.has_raw_blanks else None
+def _check_line_breaks_in_name(report: Reporter, element: Element) -> None:
+    raw_value = report.raw_value(element, "name") if report.has_replaced_characters else None
     if raw_value is not None and any(c in raw_value for c in "\t\r\n"):
         message = "the name contains a tab or a line end"
         remedy = "write the name on one line, without tabs"
-        report.add(NAME_BLANKS, message, element, attribute="name", found=quote(raw_value), remedy=remedy)
+        report.add(
+            LINE_BREAK_IN_NAME, message, element, attribute="name", found=quote(raw_value), remedy=remedy
+        )
 
 
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
     if name == "universe" and element.tag == "joint":
         message = "Pinocchio uses this name for the world and does not find the joint"
-        report.add(UNIVERSE, message, element, attribute="name", remedy="rename the joint")
+        report.add(NAME_UNIVERSE, message, element, attribute="name", remedy="rename the joint")
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
         remedy = (
@@ -468,29 +477,37 @@ _COMMENT_PATTERN = re.compile(r"\s*urdfkin:\s*ignore\s*\[([^\]]*)\]\s*(.*)", re.
 _CODE_SEPARATOR = re.compile(r"[,\s]+")
 
 
-def apply_comments(report: Reporter, codes: Mapping[str, str]) -> None:
+def apply_comments(report: Reporter, code_by_name: Mapping[str, str]) -> None:
     """Apply the comments that silence findings, and report invalid comments."""
     comment_index = CommentIndex()
     for comment in report.comments:
-        if (ignore := _read_comment(report, comment, codes)) is not None:
+        if (ignore := _read_comment(report, comment, code_by_name)) is not None:
             comment_index.add(ignore)
     report.silence(comment_index)
 
 
-def _read_comment(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> IgnoreComment | None:
+def _read_comment(
+    report: Reporter, comment: Comment, code_by_name: Mapping[str, str]
+) -> IgnoreComment | None:
     match = _COMMENT_PATTERN.fullmatch(comment.text)
     words = [word for word in _CODE_SEPARATOR.split(match[1]) if word] if match else []
-    unknown = next((word for word in words if word.lower() not in codes), None)
+    unknown = next((word for word in words if word.lower() not in code_by_name), None)
     reason = " ".join(match[2].split()) if match else ""
     remedy: str | None
     if words and unknown is None and reason:
-        return IgnoreComment(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
+        return IgnoreComment(
+            comment, tuple(dict.fromkeys(code_by_name[word.lower()] for word in words)), reason
+        )
     if not words:
         what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] the reason -->"
     elif unknown is not None:
-        close = report.nearest(unknown.lower(), codes)
+        close = report.find_nearest_names(unknown.lower(), code_by_name)
         what = f"unknown code {quote(unknown)}"
-        remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
+        remedy = (
+            f"did you mean {', '.join(dict.fromkeys(code_by_name[word] for word in close))}?"
+            if close
+            else None
+        )
     else:
         what, remedy = "no reason is given", "write the reason after the bracket"
     message = f"{what}, so the comment silences nothing"

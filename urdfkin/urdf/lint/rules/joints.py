@@ -40,14 +40,14 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
     edges = [joint for joint in robot.joints if _check_ends(report, robot, joint)]
-    is_tree = len(edges) == len(robot.joints) and _check_parents(report, robot, edges)
+    is_tree = len(edges) == len(robot.joints) and _check_loops_and_parents(report, robot, edges)
     return _check_root(report, robot) and is_tree and bool(robot.links)
 
 
 def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
-            nearest = ", ".join(report.nearest(link, robot.links))
+            nearest = ", ".join(report.find_nearest_names(link, robot.links))
             message, at = f"the {tag} link does not exist", joint.element.find(tag)
             remedy = f"did you mean {nearest}?" if nearest else f"add <link name={quote(link)}/>"
             report.add(UNKNOWN_LINK, message, at, attribute="link", found=quote(link), remedy=remedy)
@@ -59,7 +59,7 @@ def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
     return joint.parent in robot.links and joint.child in robot.links
 
 
-def _check_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
+def _check_loops_and_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
     """Report loops, and links with several parent joints. Return True if the function reports nothing."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
@@ -344,7 +344,7 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
 class _MimicChecker:
     def __init__(self, report: Reporter, joints: dict[str, JointRecord], enabled: bool) -> None:
         self.report, self.joints, self.enabled = report, joints, enabled
-        self.in_loops = _joints_in_loops(joints)
+        self.joints_in_loops = _joints_in_mimic_loops(joints)
 
     def add(
         self,
@@ -380,7 +380,7 @@ class _MimicChecker:
         mimicked_joint = self.joints.get(mimic.mimicked_joint)
         if mimicked_joint is None:
             self.report_unknown(joint, mimic)
-        elif joint.name in self.in_loops:
+        elif joint.name in self.joints_in_loops:
             itself = mimicked_joint is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
             self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
@@ -393,7 +393,7 @@ class _MimicChecker:
 
     def report_unknown(self, joint: JointRecord, mimic: MimicRecord) -> None:
         others = (name for name in self.joints if name != joint.name)
-        nearest = self.report.nearest(mimic.mimicked_joint, others)
+        nearest = self.report.find_nearest_names(mimic.mimicked_joint, others)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
@@ -425,7 +425,7 @@ class _MimicChecker:
         from urdfkin.model.tree import Limit
 
         rule, mimicked_joint = self.resolve_chain(mimic)
-        limits, moving = _range_of(joint), None if mimicked_joint is None else _range_of(mimicked_joint)
+        limits, moving = _joint_range(joint), None if mimicked_joint is None else _joint_range(mimicked_joint)
         if mimicked_joint is None or moving is None or limits is None or joint.kind == "continuous":
             return
         bounds = Limit(*limits, math.inf, math.inf)
@@ -462,7 +462,7 @@ class _MimicChecker:
         rule = Mimic(mimic.mimicked_joint, mimic.multiplier, mimic.offset)
         mimicked_joint = self.joints.get(rule.mimicked_joint)
         while mimicked_joint is not None and (next_ := mimicked_joint.mimic) is not None:
-            if mimicked_joint.name in self.in_loops:
+            if mimicked_joint.name in self.joints_in_loops:
                 return rule, None
             offset = rule.multiplier * next_.offset + rule.offset
             rule = Mimic(next_.mimicked_joint, rule.multiplier * next_.multiplier, offset)
@@ -470,7 +470,7 @@ class _MimicChecker:
         return rule, mimicked_joint
 
 
-def _range_of(joint: JointRecord) -> tuple[float, float] | None:
+def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
     """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
 
     Return None for joints of other types, for a missing `<limit>`, and if lower >= upper.
@@ -483,8 +483,8 @@ def _range_of(joint: JointRecord) -> tuple[float, float] | None:
     return (low, high) if low < high else None
 
 
-def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
-    in_loops: set[str] = set()
+def _joints_in_mimic_loops(joints: dict[str, JointRecord]) -> set[str]:
+    joints_in_loops: set[str] = set()
     visited: set[str] = set()
     for start in joints:
         path: dict[str, int] = {}
@@ -495,8 +495,8 @@ def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
             rule = joints[name].mimic
             name = None if rule is None else rule.mimicked_joint
         if name is not None and name in path:
-            in_loops |= {member for member, place in path.items() if place >= path[name]}
-    return in_loops
+            joints_in_loops |= {member for member, place in path.items() if place >= path[name]}
+    return joints_in_loops
 
 
 ROUNDED_PI = Rule("URDF601", "rounded-pi", NOTE)
@@ -504,14 +504,14 @@ DEGREES = Rule("URDF602", "degrees", WARNING)
 MILLIMETRES = Rule("URDF603", "huge-length", WARNING)
 TINY_ROBOT = Rule("URDF604", "tiny-robot", WARNING)
 SAME_PLACE = Rule("URDF605", "same-place", NOTE)
-OVERFLOW = Rule("URDF606", "overflow", ERROR)
-NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
+LENGTH_OVERFLOW = Rule("URDF606", "overflow", ERROR)
+NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
 #: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
-SUSPICIOUS_ROBOT_SIZE = 1e-4
+MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
 #: A limit is probably in degrees if it is a whole number, and
 #: `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
@@ -541,7 +541,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> 
         _check_angles(report, joint, reach, condition)
         _check_lengths(report, joint)
         _check_neutral(report, joint)
-    _check_equal_axes(report, robot)
+    _check_equal_joints(report, robot)
     if is_tree:
         _check_total_length(report, robot, reach)
 
@@ -680,7 +680,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if lower <= upper and not lower <= 0.0 <= upper:
         report.add(
-            NEUTRAL,
+            NEUTRAL_OUTSIDE_LIMITS,
             "the limits exclude 0, the value of the joint in the neutral configuration",
             limit.element,
             attribute="lower" if lower > 0.0 else "upper",
@@ -690,7 +690,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
         )
 
 
-def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
+def _check_equal_joints(report: Reporter, robot: RobotRecord) -> None:
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL_TYPES:
@@ -723,7 +723,9 @@ def _check_total_length(report: Reporter, robot: RobotRecord, reach: dict[str, f
         element = far.origin_element or far.element
         message = "the sum of the lengths along the chain is too large for a double"
         found = quote(element.attributes.get("xyz", ""))
-        report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
-    elif 0.0 < whole < SUSPICIOUS_ROBOT_SIZE:
+        report.add(
+            LENGTH_OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent"
+        )
+    elif 0.0 < whole < MIN_PLAUSIBLE_ROBOT_SIZE:
         message = f"the joint origins along the longest chain of the robot add up to {_length_text(whole)}"
         report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")
