@@ -692,8 +692,8 @@ class _StageReader:
         """Return bounds on the errors of a prim's position (m) and orientation (rad) relative to a body.
 
         The cause of the errors is rounding to single precision. The body None is the world. An error in the
-        rotation of a prim also displaces all prims below the prim. `translation_length_sum` is the sum of the lengths (m) of
-        the translations from the body to the prim. Transforms in half precision are ignored.
+        rotation of a prim also displaces all prims below the prim. `translation_length_sum` is the sum of the
+        lengths (m) of the translations from the body to the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
