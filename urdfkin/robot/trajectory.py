@@ -317,7 +317,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
         coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With the time step h, the error of a is proportional to h^order.
+        # The error of the acceleration is proportional to h^order, where h is the time step.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"

@@ -40,7 +40,7 @@ class CellDifference:
     Values are in m or rad.
 
     Attributes:
-        tip_displacement: Largest displacement of the tip on samples if this cell is corrected, m.
+        tip_displacement: Largest displacement (m) of the tip by the correction of this cell, on samples.
         half_digit: Half a unit of the last digit of `reference`.
             0 if the value is exact or the cell's text is unknown.
     """

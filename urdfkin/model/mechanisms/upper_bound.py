@@ -280,7 +280,7 @@ def upper_bounds(
 def joints_from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return a frame's joint pairs and their values, beginning with the first joint that differs."""
+    """Return the matched joints on the path to a frame, from the first difference on, and their values."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
