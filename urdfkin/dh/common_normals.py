@@ -299,7 +299,7 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # If a row from i to end - 1 is a Hayati row, d gives this row the reference's cell a.
+        # If the most tilted of rows i to end - 1 is a Hayati row, d gives this row the reference's a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
