@@ -318,7 +318,8 @@ def _choose_phi(
     """Return the phi with which theta of row i equals the reference.
 
     Exception: prismatic joints i + 1 to k follow a revolute joint i or row 0.
-    If k is the first of them whose phi the axes determine, theta of rows i + 1 to k equals the reference.
+    Let k be the first of them whose phi the axes determine.
+    Then theta of rows i + 1 to k equals the reference.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
