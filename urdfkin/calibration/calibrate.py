@@ -159,7 +159,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """Changes (p,) of all parameters in `written_fit`, m and rad. The file can store only some."""
+        """(p,) changes of all parameters by `written_fit`, m and rad. The file can store only some."""
         return self._parameter_changes(self.written_fit)
 
     @cached_property

@@ -12,7 +12,7 @@ can have a gain g:
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
 directly before the tip also has six parameters. Other fixed joints have no parameters. On a path from parent
-to child, the parameters of a later joint have the same effect.
+to child, a later joint's parameters have the effect of a fixed joint's.
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis

@@ -123,9 +123,9 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all joints turn about z, the joint origins are copied from the file. If a joint has another axis, the
-    origins are fitted to the calibrated arm's poses. The poses of `tool0` in `base` are then those of the
-    calibrated arm.
+    If all joints turn about z, the joint origins are copied from the file. If a joint of the URDF has another
+    axis, the origins are fitted to the calibrated arm's poses. The poses of `tool0` in `base` are then those
+    of the calibrated arm.
     """
     robot = as_robot(robot)
     origins = read_calibrated_origins(path, order)

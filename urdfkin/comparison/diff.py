@@ -119,7 +119,7 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes. For versions of the same format: of the robot's name, then joints, then links.
+        changes: The changes. Versions of the same format: first the robot's name, then joints, then links.
         effects: One entry for each joint or link whose changes move links. In this entry, all other joints
             are unchanged. A joint whose effect cannot be computed, such as a new joint, has no entry.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`

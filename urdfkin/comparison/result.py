@@ -139,7 +139,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The values in A and B; None for a missing value, a mimic rule, or names of links."""
+        """The values in A and B. Each is None if it is missing, a mimic rule, or link names."""
         if self.what == "limits":
             return _format_range(self.a), _format_range(self.b)
         if self.what == "idle":
@@ -444,7 +444,7 @@ class Sameness(Displayable):
 
         The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
         wrong number can also move frames by less than this limit. Therefore, only `up_to_single` proves that
-        rounding is the cause. For every other verdict than `Verdict.DIFFERS`, the result is False.
+        rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single

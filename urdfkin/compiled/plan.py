@@ -480,7 +480,7 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state of `step` if an event after the next event needs the state.
+        """Save the state of `step` if an event after event `following` needs the state.
 
         `following` is the index of the next event. At this event, the state is still in the registers.
         """

@@ -299,7 +299,7 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # If a row from i to end - 1 is a Hayati row, d gives this row the reference's cell a.
+        # If the most tilted of rows i to end - 1 is a Hayati row, d gives this row the reference's a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -318,7 +318,8 @@ def _choose_phi(
     """Return the phi with which theta of row i equals the reference.
 
     Exception: prismatic joints i + 1 to k follow a revolute joint i or row 0.
-    If k is the first of them whose phi the axes determine, theta of rows i + 1 to k equals the reference.
+    Let k be the first of them whose phi the axes determine.
+    Then theta of rows i + 1 to k equals the reference.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:

@@ -499,8 +499,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
 
     At the singularity, only the sum or difference of the
     first and third angle is determined.
-    For moving axes, the third angle then follows from the first angle.
-    For fixed axes, the first angle then follows from the third angle.
+    At the singularity of moving axes, the third angle follows from the first angle.
+    At the singularity of fixed axes, the first angle follows from the third angle.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.

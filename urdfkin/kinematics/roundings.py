@@ -315,7 +315,7 @@ LENGTH_ROUNDINGS = 4.0
 
 #: Rounding error (in eps rad) of an angle between -pi and pi.
 #: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
-#: An angle in a file, rounded to a double, has an error of 1.0.
+#: The rounding of a file's angle to a double has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #:

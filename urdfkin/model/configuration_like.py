@@ -83,7 +83,7 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values by name, and the configuration of the named pose.
+        """Return the given values by name, and the numbers of the pose that `value` names.
 
         The pose is None if the text names no pose.
 

@@ -728,8 +728,8 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    False entries are 0 for every q. In WORLD, a base motion can make a False entry nonzero, unless
-    `root_at_origin` is False. Only WORLD depends on `root_at_origin`.
+    False entries are 0 for every q. In WORLD with `root_at_origin`, a base motion can make a False entry
+    nonzero. Only WORLD depends on `root_at_origin`.
 
         linear rows of a revolute joint: z x d
         WORLD: d leads from the joint to the world's origin

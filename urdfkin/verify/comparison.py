@@ -1,8 +1,8 @@
 """Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
-`disagreement` defines the difference of two numbers. NumPy takes as long as Pinocchio to compute the
-differences. After some computing time, a compiled kernel therefore replaces NumPy. The kernel and NumPy
-return equal numbers.
+`disagreement` defines the difference of two numbers. NumPy takes as long for the differences as Pinocchio
+takes for the results. After some computing time, a compiled kernel therefore replaces NumPy. The kernel and
+NumPy return equal numbers.
 """
 
 from __future__ import annotations

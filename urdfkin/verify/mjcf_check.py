@@ -52,7 +52,8 @@ class MjcfReading:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
         shapes_refusal: None if the robot comes from the complete file. Otherwise, the robot comes from
-            the file without shapes and inertias. With check=True, the text is the reason.
+            the file without shapes and inertias. With check=True, the text says why reading the
+            complete file failed.
     """
 
     urdf: str

@@ -19,10 +19,10 @@ therefore reads the mimic rules from the URDF text.
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
 planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: the user gives a matrix M. The base's rotation R is the nearest rotation to M. urdfkin computes R
-with one Newton step (`urdfkin.kinematics.rotation`). This module uses Davenport's q-method: among all unit
-quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion of the nearest
-rotation is therefore the eigenvector of K for the largest eigenvalue.
+Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the nearest
+rotation to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
+Davenport's q-method: among all unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest
+rotation. The quaternion of the nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference between two programs' normalised axes, per component.
-#: In each program, the relative error of the length is at most 2 eps.
+#: In urdfkin and yourdfpy, the relative error of an axis's length is at most 2 eps.
 #: The quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS
 #: Largest accepted difference between 1 and the length of yourdfpy's axis.

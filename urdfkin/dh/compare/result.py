@@ -231,7 +231,7 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether both limits are finite, and lower < upper.
 
-    With equal limits, the joint's direction of motion cannot be found from poses. Both limits are 0 if a URDF
+    If lower = upper, poses do not show the joint's direction of motion. Both limits are 0 if a URDF
     omits them.
     """
     return is_bounded(limit) and limit.lower < limit.upper

@@ -77,9 +77,9 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on comparisons that decide between equally good choices.
+    """A limit on the number of comparisons that decide between equally good choices.
 
-    Each comparison is of a joint of A and a joint of B, after the joints of the choice.
+    Each comparison takes a joint of A and a joint of B, farther along than the chosen joints.
 
     Several matchers can share a limit.
 
@@ -188,7 +188,7 @@ class MechanismMatcher:
         """Return an upper bound on the number of matches from the bodies `base`.
 
         Two branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
-        The sum of min(m, n) is largest if the branches of each model are sorted by m or n.
+        The sum of min(m, n) is largest if A's and B's branches are sorted by size.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):

@@ -628,7 +628,7 @@ class Alignment:
         """Yield two joint pairs whose partners can be exchanged.
 
         Both pairs have the same kind and the same previous pair.
-        Each of the two pairs, or a joint pair or link pair after it, differs.
+        Each of the two pairs differs, or a joint pair or link pair after it differs.
         In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)

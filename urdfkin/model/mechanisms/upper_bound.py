@@ -154,7 +154,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the maximum of h over all rotations about `screw` from `low` to `high` (rad)."""
+        """Return an upper bound on h over all rotations about `screw` from `low` to `high` (rad)."""
         angles, factors = np.array(_polygon_around_arc(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
