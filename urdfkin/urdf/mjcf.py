@@ -355,7 +355,7 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-#: Lists of MuJoCo's model that kinematics does not use.
+#: Kinds of MuJoCo elements that kinematics does not use.
 #: Keys are attributes of `MjSpec`; values are the singulars in messages.
 _UNUSED_ELEMENTS = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",

@@ -111,8 +111,8 @@ class FunctionCheck(Displayable):
         oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of bound * factor. None
             without an oracle.
         rows: The dictionary {name of the row: `bound_ratio` of the row}, for example {"vx": 0.2}.
-        columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for
-            quantities without a column for each joint velocity.
+        columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for a
+            result without such columns, for example a placement.
         worst: The worst result; None if no result was compared.
         errors: Number of configurations with an exception, or without real numbers in the right shape.
         first_errors: The first exceptions and invalid results, with messages.
