@@ -350,7 +350,10 @@ def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: p
 
 @pytest.mark.parametrize("word", ["local:", "local:0", "local:-1", "local:two"])
 def test_a_local_cluster_has_a_number_of_workers(word: str) -> None:
-    with pytest.raises(InputError, match="N in local:N must be a whole number, at least 1"), connect_cluster(word):
+    with (
+        pytest.raises(InputError, match="N in local:N must be a whole number, at least 1"),
+        connect_cluster(word),
+    ):
         pass
 
 

@@ -75,7 +75,7 @@ _CHANGE_MARGIN_SIGMAS = 5.0
 #:     ratio = _MAX_IMPROVED_ERROR_RATIO    otherwise
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
-#: All parameters are fitted for at most this number of corrections from `_corrections`.
+#: Largest number of corrections after which all parameters are fitted again.
 #: The corrections are tried in ascending order of `_Trial.error_before`.
 _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.

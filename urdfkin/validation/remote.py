@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: Return value of `run` for a chunk: a word and data.
 #: "answer": The data are the pickled answer of the chunk.
 #: "died": The chunk crashed two processes.
-#: The data name the signal or exit status of the second crash.
+#: The data are a text with the signal or exit status of the second crash.
 #: "other code": The worker's versions or digests differ from the client's.
 #: The data are the worker's versions or digests.
 ChunkOutcome = (

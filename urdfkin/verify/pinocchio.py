@@ -329,7 +329,7 @@ class PinocchioOracle(Oracle):
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Pinocchio's Hessians without two errors of Pinocchio 4.1.
+        """Return Pinocchio's Hessians, with two errors of Pinocchio 4.1 corrected.
 
         - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
         - In LOCAL, Pinocchio's derivative of a joint's column with respect to the same joint can be nonzero.

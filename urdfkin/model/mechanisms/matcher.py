@@ -77,7 +77,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the number of comparisons that decide between equally good choices.
+    """The largest number of comparisons for decisions between equally good choices.
 
     Each comparison takes a joint of A and a joint of B, farther along than the chosen joints.
 
