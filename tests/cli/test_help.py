@@ -143,6 +143,7 @@ def test_explain_lists_the_codes_and_equations_whose_description_has_a_word() ->
     assert {"URDF506", "URDF527"} < {line.split()[0] for line in good("explain limit").text.splitlines()}
     assert good("explain 'transverse coriolis'").text.startswith("7.130 ")
     assert "did you mean" in refused("explain roundedpi")
+    assert "`urdfkin explain` lists all names" in refused("explain xyzzy")
 
 
 def test_explain_without_an_argument_lists_all_sections_with_equations() -> None:

@@ -128,7 +128,9 @@ def explain_command(topic: str | None) -> None:
                 found=shorten(topic),
                 remedy=f"did you mean {', '.join(related[:3])}?",
             )
-        raise UnknownNameError("code, equation or question", topic, names)
+        error = UnknownNameError("code, equation or question", topic, names)
+        error.remedy = f"{error.remedy} `urdfkin explain` lists all names"
+        raise error
 
 
 def _list_matches(topic: str) -> list[str]:

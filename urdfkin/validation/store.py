@@ -253,14 +253,13 @@ class Store:
 
     def check_same_campaign(self, manifest: Manifest, where: object = None) -> None:
         if differences := self.manifest.differences(manifest):
-            there, remedy = (
-                "here",
-                "use the options, robot files and versions of this campaign, or another folder",
-            )
-            if any(difference.startswith("robot ") for difference in differences):
-                remedy += "; with --retry failed, the file of a failed robot may differ"
             if where is not None:
                 there, remedy = f"in {where}", "merge only stores of one validation"
+            else:
+                there = "here"
+                remedy = "use the options, robot files and versions of this campaign, or another folder"
+                if any(difference.startswith("robot ") for difference in differences):
+                    remedy += "; with --retry failed, the file of a failed robot may differ"
             raise InputError(
                 "the store belongs to another campaign",
                 where=str(self.folder),
