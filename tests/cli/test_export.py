@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.attacks.hostile import urdf
-from tests.cli.running import good, urdfkin
+from tests.cli.running import good, refused, urdfkin
 
 
 @pytest.mark.slow
@@ -34,8 +34,19 @@ def test_the_suffix_of_the_output_selects_the_language(suffix: str, words: str, 
     assert re.search(rf"To try it: .* elbow\.{suffix}( |$)", text, re.MULTILINE), (
         "the command names this file"
     )
-    good("export planar_two_link --quantity jacobian --to latex -o", str(path))
-    assert words not in path.read_text("utf-8")
+    good("export planar_two_link --quantity jacobian --to latex -o", str(path.with_suffix(".txt")))
+    assert words not in path.with_suffix(".txt").read_text("utf-8")
+
+
+def test_a_language_that_contradicts_the_suffix_is_refused_and_no_file_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "elbow.py"
+    command = "export planar_two_link --quantity jacobian"
+    assert "--to c contradicts the file's suffix" in refused(f"{command} --to c -o", str(path))
+    assert "use .c, .h, .hpp" in refused(f"{command} -o", str(path.with_suffix(".rs")))
+    assert not list(tmp_path.iterdir())
+    good(f"{command} --to numba -o", str(path))
+    good(f"{command} -o", str(path.with_suffix(".h")))
+    assert "good jacobian: 4 test vectors" in good("export --check", str(path.with_suffix(".h"))).text
 
 
 def test_an_export_on_standard_output_contains_no_log_command() -> None:

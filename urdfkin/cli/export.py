@@ -13,6 +13,7 @@ import click
 
 from urdfkin.cli.options import (
     FILE,
+    format_from_suffix,
     frame_option,
     load_robot,
     reference_option,
@@ -41,10 +42,15 @@ from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
 
+#: Languages that a file with this suffix may contain; without --to, the first one.
 _LANGUAGES_OF_SUFFIXES = {
-    ".hpp": "cpp", ".hh": "cpp", ".hxx": "cpp", ".cpp": "cpp", ".cc": "cpp", ".cxx": "cpp",
-    ".cuh": "cuda", ".cu": "cuda", ".py": "numpy", ".m": "matlab", ".tex": "latex",
-}  # fmt: skip
+    **dict.fromkeys((".c", ".h"), ("c",)),
+    **dict.fromkeys((".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx"), ("cpp",)),
+    **dict.fromkeys((".cuh", ".cu"), ("cuda",)),
+    ".py": tuple(language for language, (_, suffix) in LANGUAGES.items() if suffix.endswith(".py")),
+    ".m": ("matlab",),
+    ".tex": ("latex",),
+}
 #: Common names of languages and libraries, each with the name that --to accepts.
 _LANGUAGE_SYNONYMS = {
     "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
@@ -76,7 +82,7 @@ class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a
     "--to",
     type=_Language(tuple(LANGUAGES)),
     help="Language of the code.",
-    show_default="the language of the suffix of --output (.py: numpy); otherwise c",
+    show_default="the language of the suffix of --output (.py: numpy); c without a suffix",
 )
 @click.option(
     "--form",
@@ -131,8 +137,7 @@ def export_command(
     from urdfkin.export.forms import make_robot_code
 
     assert robot is not None
-    if to is None:
-        to = "c" if output is None else _LANGUAGES_OF_SUFFIXES.get(output.suffix.lower(), "c")
+    to = format_from_suffix(context, output, _LANGUAGES_OF_SUFFIXES, "c", "to")
     loaded = load_robot(robot, verify=verify)
     names = [word.strip() for words in quantities for word in words.split(",")] or list(DEFAULT_QUANTITIES)
     frame = frame or loaded.tip_frame

@@ -56,33 +56,39 @@ class NumberInRange(FiniteNumber, click.FloatRange):
 
 
 def format_from_suffix(
-    context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], default_format: str
+    context: click.Context,
+    output: Path | None,
+    formats: Mapping[str, Sequence[str]],
+    default_format: str,
+    parameter: str = "format_",
 ) -> str:
-    """Return the output format that --format or the suffix of the output file selects.
+    """Return the output format that an option or the suffix of the output file selects.
 
-    Raise InputError if --format contradicts the suffix. `formats` lists the formats of each suffix, the
-    default first: `{".py": ("numpy", "sympy")}`.
+    The option is --format, or the one whose value is `context.params[parameter]`. Raise InputError if the
+    option contradicts the suffix. `formats` lists the formats of each suffix, the default first:
+    `{".py": ("numpy", "sympy")}`.
     """
-    format_: str = context.params["format_"]
+    format_: str = context.params[parameter] or default_format
     if output is None:
         return format_
-    chosen = is_on_command_line(context, "format_")
+    option = "--" + parameter.strip("_")
+    chosen = is_on_command_line(context, parameter)
     suffix = output.suffix.lower()
     if suffix not in formats:
         if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
                 where=abbreviate_path(output),
-                remedy=f"use {', '.join(formats)}, or add --format",
+                remedy=f"use {', '.join(formats)}, or add {option}",
             )
         return format_ if chosen else default_format
     if not chosen:
         return formats[suffix][0]
     if format_ not in formats[suffix]:
         raise InputError(
-            f"--format {format_} contradicts the file's suffix",
+            f"{option} {format_} contradicts the file's suffix",
             where=str(output),
-            remedy="leave out --format, or give the file another name",
+            remedy=f"leave out {option}, or give the file another name",
         )
     return format_
 

@@ -35,7 +35,7 @@ _STRICT_FLAGS = ("-Wall", "-Wextra", "-pedantic", "-Werror")
 _CUDA_SUFFIXES = (".cuh", ".cu")
 #: Compiler and options for each suffix.
 _COMPILE_COMMANDS = {
-    ".c": ("cc", "-std=c99", "-x", "c", *_STRICT_FLAGS),
+    **dict.fromkeys((".c", ".h"), ("cc", "-std=c99", "-x", "c", *_STRICT_FLAGS)),
     **dict.fromkeys(
         (".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx", *_CUDA_SUFFIXES),
         ("c++", "-std=c++11", "-x", "c++", *_STRICT_FLAGS),
