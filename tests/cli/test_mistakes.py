@@ -91,6 +91,7 @@ MISTAKES = {
     "validate ur5 --store s --shard 3/2": "must have the form i/n",
     "validate ur5 --scheduler local:2 --jobs 2": "--scheduler cannot be combined",
     "validate ur5 --scheduler local:none": "N in local:N must be a whole number, at least 1",
+    "imu ur5 --gravity 0,0": "--gravity: 3 numbers are expected (x, y, z): found 2, none for z\n",
     "velocity ur5 --base-placement 0,0,0": "6 numbers are expected (x, y, z, roll,",
     "velocity ur5 --base-placement 0,0,0,0,0,0,2": "must be a unit quaternion: found norm 2",
     "velocity ur5 --base-velocity 0,0,0,0,0,x": "--base-velocity, wz: not a finite number: found 'x'",

@@ -257,7 +257,7 @@ def wrong_count_error(
     count: int,
     where: str,
     remedy: str | None = None,
-    question: QuestionsSection = QuestionsSection.JOINT_ORDER,
+    question: QuestionsSection | None = QuestionsSection.JOINT_ORDER,
 ) -> InputError:
     without = f", none for {join_names(names[count:])}" if count < len(names) else ""
     return InputError(

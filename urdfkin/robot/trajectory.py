@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors import InputError, SourceError
+from urdfkin.errors import InputError, QuestionsSection, SourceError
 from urdfkin.errors.numbers import (
     UNIT_SHORT_NAMES,
     number_remedy,
@@ -472,7 +472,9 @@ def read_columns(
         _check_columns(names, cells, f"{where}:{line}", what, required, optional)
     elif first is not None:
         rows = chain([first], rows)
-    values = chain.from_iterable(parse_numbers(cells, f"{where}:{line}", names) for line, cells in rows)
+    values = chain.from_iterable(
+        parse_numbers(cells, f"{where}:{line}", names, QuestionsSection.JOINT_ORDER) for line, cells in rows
+    )
     table = np.fromiter(values, np.float64).reshape(-1, max(1, len(names)))
     found = {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
     return found | {
@@ -559,10 +561,12 @@ def count_cells(text: str, where: str) -> int:
     return len(next(_rows(text, where), (0, []))[1])
 
 
-def parse_numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
-    """Parse one number for each name."""
+def parse_numbers(
+    cells: Sequence[str], where: str, names: Sequence[str], question: QuestionsSection | None = None
+) -> list[float]:
+    """Parse one number for each name; the error for a wrong count refers to `question`."""
     if len(cells) != len(names):
-        raise wrong_count_error(names, len(cells), where)
+        raise wrong_count_error(names, len(cells), where, question=question)
     values = []
     for name, cell in zip(names, cells, strict=True):
         if (value := parse_float(cell)) is None:
