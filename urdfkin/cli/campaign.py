@@ -20,6 +20,7 @@ import click
 from urdfkin.cli.options import FOLDER
 from urdfkin.cli.output import make_console
 from urdfkin.cli.streams import join_lines, say
+from urdfkin.errors.display import format_count
 from urdfkin.errors.escape import escape_unprintable
 
 if TYPE_CHECKING:
@@ -210,7 +211,6 @@ def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    from urdfkin.report.words import format_count
     from urdfkin.validation.store import AccuracyStore
 
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
@@ -250,7 +250,6 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
     DIR is made if it does not exist.
     """
-    from urdfkin.report.words import format_count
     from urdfkin.validation.store import AccuracyStore, Store, open_store
 
     others = [Store.open_read_only(store, warn) for store in stores]

@@ -26,10 +26,11 @@ from urdfkin.cli.options import (
     root_joint_option,
     source_options,
 )
-from urdfkin.cli.output import format_count, write_output
+from urdfkin.cli.output import write_output
 from urdfkin.cli.shell import complete_code, complete_file
 from urdfkin.cli.streams import escape_for_terminal, print_github_commands, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
+from urdfkin.errors.display import format_count
 from urdfkin.system.files import read_bytes, read_start, require_regular_file, write_file
 from urdfkin.system.git import CommitFiles, merge_base_files
 from urdfkin.system.lazy_import import installed_version

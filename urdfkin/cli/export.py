@@ -28,14 +28,13 @@ from urdfkin.cli.output import (
     answer_command,
     certificate_exit_code,
     format_check_line,
-    format_count,
     output_option,
     write_output,
 )
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, SourceError
-from urdfkin.errors.display import Table, TextDocument
+from urdfkin.errors.display import Table, TextDocument, format_count
 from urdfkin.errors.escape import csv_number_or_text
 from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 

@@ -21,7 +21,7 @@ import click
 from urdfkin.cli.options import FILE, combine, format_from_suffix
 from urdfkin.cli.streams import say, say_file_content
 from urdfkin.errors import SourceError
-from urdfkin.errors.display import TextDocument
+from urdfkin.errors.display import TextDocument, format_count
 from urdfkin.errors.escape import csv_text, json_text
 from urdfkin.errors.numbers import parse_int
 from urdfkin.system.files import refuse_read_only, write_file
@@ -203,10 +203,6 @@ def check_writable(*paths: Path | None) -> None:
         except OSError as error:
             found = error.strerror or str(error)
             raise SourceError("cannot be written", where=str(path), found=found) from error
-
-
-def format_count(n: int, noun: str) -> str:
-    return f"{n} {noun}{'s' * (n != 1)}"
 
 
 def format_check_line(certificate: Certificate) -> str:

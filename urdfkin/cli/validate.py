@@ -27,6 +27,7 @@ from urdfkin.cli.reports import REPORT_FILE_OPTIONS, report_options, say_written
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors.display import format_count
 from urdfkin.system.files import is_folder
 from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf.catalogue import catalogue, example_robot_data_names
@@ -318,8 +319,6 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    from urdfkin.report.words import format_count
-
     for robot in report.robots:
         if robot.reason is not None:
             say(f"{robot.source}: {robot.verdict}: {join_lines(robot.reason)}")

@@ -230,6 +230,11 @@ def _html(words: str) -> str:
     return escape(escape_unprintable(words))
 
 
+def format_count(n: int, noun: str) -> str:
+    """Return a number with its noun: "1 robot", "1,000 robots"."""
+    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
+
+
 def format_number(value: float, noise: float = NOISE_FRACTION, digits: int = 6) -> str:
     """Format a number with `digits` significant digits; absolute values up to `noise` become "0".
 

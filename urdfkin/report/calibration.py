@@ -9,10 +9,9 @@ import numpy as np
 from urdfkin.calibration.calibrate import Calibration, list_warnings
 from urdfkin.calibration.write_back import UpdatedURDF
 from urdfkin.comparison.result import angle, length
-from urdfkin.errors.display import Strong, Table, TextDocument
+from urdfkin.errors.display import Strong, Table, TextDocument, format_count
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
 #: If the user states no noise, the noise is estimated.

@@ -30,7 +30,7 @@ import numpy as np
 
 from urdfkin.comparison.result import angle, length, pose_words
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.errors.display import Strong, Table, TextDocument
+from urdfkin.errors.display import Strong, Table, TextDocument, format_count
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
@@ -39,7 +39,6 @@ from urdfkin.report.markdown import MAX_CHARACTERS, count_within, row_line, shor
 from urdfkin.report.words import (
     VERDICTS,
     check_name,
-    format_count,
     format_ratio,
     format_units,
     quantity_name,

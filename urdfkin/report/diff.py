@@ -8,10 +8,9 @@ from typing import Any, cast
 
 from urdfkin.comparison.diff import Changes, ModelChange, displacement_text, format_value
 from urdfkin.comparison.result import angle, length
-from urdfkin.errors.display import Strong, Table, TextDocument
+from urdfkin.errors.display import Strong, Table, TextDocument, format_count
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import MAX_CHARACTERS, count_within, row_line, shorten, table_lines
-from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
 HEADS = ("element", "what", "old", "new", "alone")

@@ -17,14 +17,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict, cast
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.display import Strong, Table, TextDocument
+from urdfkin.errors.display import Strong, Table, TextDocument, format_count
 from urdfkin.report.compare import ChangeEntry, ReportChange, compare, find_renamed_files, robots_by_source
 from urdfkin.report.html import format_date, render_template
 from urdfkin.report.reading import check_document, read_stored_document
 from urdfkin.report.words import (
     VERDICTS,
     bound_ratio_of,
-    format_count,
     format_ratio,
     format_units,
     utc,

@@ -16,6 +16,7 @@ from html import escape
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from urdfkin.errors.display import format_count
 from urdfkin.errors.escape import log_line
 from urdfkin.report import pages
 from urdfkin.report.figures import distributions, scene
@@ -27,7 +28,6 @@ from urdfkin.report.words import (
     check_name,
     checks_in_order,
     disagreement_cell,
-    format_count,
     format_ratio,
     format_units,
     pinocchio_version,

@@ -6,13 +6,13 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from itertools import accumulate
 
+from urdfkin.errors.display import format_count
 from urdfkin.errors.escape import escape_unprintable, markdown_code
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.words import (
     VERDICTS,
     bound_ratio_cell,
     check_name,
-    format_count,
     format_units,
     quantities_by_heading,
     quantities_disagreement_cell,

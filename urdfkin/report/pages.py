@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.dh.units import Units as DisplayUnits
+from urdfkin.errors.display import format_count
 from urdfkin.model.configuration import format_range
 from urdfkin.model.summary import format_axis
 from urdfkin.report.words import (
@@ -17,7 +18,6 @@ from urdfkin.report.words import (
     checks_of_quantities,
     disagreement_cell,
     error_cells,
-    format_count,
     format_ratio,
     format_units,
     more_accurate,

@@ -21,7 +21,7 @@ from urdfkin.comparison.result import (
     length,
 )
 from urdfkin.comparison.verdict import base_as_written
-from urdfkin.errors.display import Strong, Table, TextDocument
+from urdfkin.errors.display import Strong, Table, TextDocument, format_count
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.configuration import TRAVEL_CONDITION, coordinate_names, units
@@ -29,7 +29,6 @@ from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.report.markdown import table_lines
-from urdfkin.report.words import format_count
 from urdfkin.robot import Robot
 
 #: Maximum number of printed lines for each kind of difference.

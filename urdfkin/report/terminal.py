@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from urdfkin.errors.display import Table
+from urdfkin.errors.display import Table, format_count
 from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
     accuracy_words,
@@ -19,7 +19,6 @@ from urdfkin.report.words import (
     checks_of_quantity,
     disagreement_cell,
     error_cells,
-    format_count,
     format_ratio,
     format_units,
     more_accurate,

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from typing import Literal
 
+from urdfkin.errors.display import format_count
 from urdfkin.validation.document import (
     Document,
     ReportedAccuracy,
@@ -210,10 +211,6 @@ def summary(document: Document) -> str:
         f"{state}{format_count(len(robots), 'robot')}, {results:,} results compared, {failed:,} outside their"
         f" bound, {document['seconds']:.1f} s, seed {document['seed']}"
     )
-
-
-def format_count(n: int, noun: str) -> str:
-    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
 def verdict_counts(document: Document) -> dict[str, int]:
