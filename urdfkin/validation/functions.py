@@ -113,7 +113,8 @@ class FunctionCheck(Displayable):
         rows: The dictionary {name of the row: `bound_ratio` of the row}, for example {"vx": 0.2}.
         columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for a
             result without such columns, for example a placement.
-        worst: The worst result; None if no result was compared.
+        worst: The worst result; None if no result was compared, or if the results contain no numbers (a
+            Jacobian of a robot without moving joints).
         errors: Number of configurations with an exception, or without real numbers in the right shape.
         first_errors: The first exceptions and invalid results, with messages.
         diagnoses: Possible mistakes in the function. Each mistake, or pair of mistakes, explains all results,
@@ -207,8 +208,8 @@ class FunctionCheck(Displayable):
             parts += self._list_first_errors()
         if not self.agrees:
             parts += [f"Diagnosis: {words}." for words in self.diagnoses]
-        if not self.agrees and self.compared:
-            parts += self._describe_worst()
+        if not self.agrees and self.worst is not None:
+            parts += self._describe_worst(self.worst)
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
 
     def _list_first_errors(self) -> Iterator[str]:
@@ -217,19 +218,18 @@ class FunctionCheck(Displayable):
             samples = [str(error.sample) for error in self.first_errors if error.message == message]
             yield f"  sample{'s' if len(samples) > 1 else ''} {', '.join(samples)}: {message}"
 
-    def _describe_worst(self) -> Iterator[str | Table]:
+    def _describe_worst(self, worst: WorstResult) -> Iterator[str | Table]:
         for title, ratios in (("row", self.rows), ("column", self.columns)):
             wrong = [(name, f"{ratio:.3g}") for name, ratio in ratios.items() if not ratio <= 1.0]
             if wrong and len(wrong) < len(ratios):
                 yield Table((title, "of the bound"), wrong)
             elif wrong:
                 yield f"Every {title} differs."
-        assert self.worst is not None
-        yield self.worst.describe_largest(tuple(self.rows), tuple(self.columns))
-        yield f"Worst result: sample {self.worst.sample}, with"
-        for letter, values in zip("qva", self.worst.inputs, strict=False):
+        yield worst.describe_largest(tuple(self.rows), tuple(self.columns))
+        yield f"Worst result: sample {worst.sample}, with"
+        for letter, values in zip("qva", worst.inputs, strict=False):
             yield f"  {letter} = [{', '.join(map(repr, values.tolist()))}]"
-        yield f"  the expected result: {self.worst.replay}"
+        yield f"  the expected result: {worst.replay}"
 
 
 class _RecordingVerifier:
