@@ -39,7 +39,6 @@ class RobotInput:
         sha256: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in errors and warnings, if `source` is the text of the robot.
         source_findings: Errors and warnings about the original MJCF or USD file.
-        made: Whether the text was converted to URDF from another format.
     """
 
     source: str | bytes
@@ -47,7 +46,6 @@ class RobotInput:
     sha256: str = ""
     file: str = "<bytes>"
     source_findings: tuple[Finding, ...] = ()
-    made: bool = False
 
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
@@ -93,7 +91,6 @@ class RobotInput:
                 oracle=ORACLES[self.origin.oracle or PINOCCHIO.name].name,
                 lock=dict(self.origin.lock),
                 source_findings=self.source_findings,
-                is_generated=self.made,
             )
         robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
         return robot
@@ -152,7 +149,7 @@ def _make_robot_input(
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
-            return replace(RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint)), made=True)
+            return RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint))
     if isinstance(robot, Robot):
         return RobotInput.of(robot)
     if is_xacro(robot):
