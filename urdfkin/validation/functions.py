@@ -65,7 +65,7 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: The function's inputs: q, or q and v, or q, v and a.
-        bound: Largest allowed difference of each number.
+        bound: Largest allowed difference of each number: bound on rounding errors * `FunctionCheck.factor`.
         replay: A command or a line of Python that computes the expected result.
     """
 
@@ -116,9 +116,10 @@ class FunctionCheck(Displayable):
         worst: The worst result; None if no result was compared, or if the results contain no numbers (a
             Jacobian of a robot without moving joints).
         errors: Number of configurations with an exception, or without real numbers in the right shape.
-        first_errors: The first exceptions and invalid results, with messages.
-        diagnoses: Possible mistakes in the function. Each mistake, or pair of mistakes, explains all results,
-            or one column of a Jacobian.
+        first_errors: At most five exceptions and invalid results, with messages.
+        diagnoses: Possible causes of the differences: mistakes in the function, rounding, or results that are not
+            finite. Each mistake, or pair of mistakes, explains all results, or one column of a
+            Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -213,7 +214,6 @@ class FunctionCheck(Displayable):
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
 
     def _list_first_errors(self) -> Iterator[str]:
-        """Yield each different message with the indices of its samples."""
         for message in dict.fromkeys(error.message for error in self.first_errors):
             samples = [str(error.sample) for error in self.first_errors if error.message == message]
             yield f"  sample{'s' if len(samples) > 1 else ''} {', '.join(samples)}: {message}"
@@ -233,7 +233,7 @@ class FunctionCheck(Displayable):
 
 
 class _RecordingVerifier:
-    """A verifier that stores the inputs of the latest call of each quantity."""
+    """A verifier that stores the latest call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -275,7 +275,7 @@ def verify_function(
         robot: The robot whose kinematics the function computes.
         quantity: Name of the quantity: "placement", "velocity", "jacobian", "jacobian rate", "hessian",
             "acceleration", "relative placement", "analytical jacobian" or "imu".
-        frame: Name of a link or joint; None: the robot's only tip.
+        frame: Name of a link or joint; None: the default tip, `robot.tip_frame`.
         reference: Reference frame of the result.
         convention: Convention of the function's inputs and results, in a form that `Robot.convention`
             accepts. None: urdfkin's convention.
@@ -344,14 +344,16 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """The results of a user's function and of urdfkin.
+    """Results for a batch of configurations, of which n have a valid result of the user's function.
 
     Attributes:
-        valid_indices: Indices of the n configurations with a valid result.
+        first: Index of the batch's first configuration in the whole check.
+        inputs: Inputs of all configurations of the batch, in the function's convention.
+        valid_indices: (n,) indices in the batch.
         actual: (n, ...) results of the function.
         expected: (n, ...) results of urdfkin.
-        scale: Scale of each number. The bound is k * eps * scale.
-        k: (n,) factor of the bound.
+        scale: (n, ...) scale of each number. The allowed difference is k * eps * scale.
+        k: (n,) `FunctionCheck.factor` included.
     """
 
     first: int
@@ -441,10 +443,7 @@ class _Run:
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
-        """Compute urdfkin's results, without verification.
-
-        Inputs and results are in the function's convention.
-        """
+        """Inputs and results are in the function's convention; the results are not verified."""
         native_inputs = self._to_native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
@@ -520,12 +519,10 @@ class _Run:
         return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Convert the scale of a bound to the function's convention.
+        """Reorder the rows, and convert the columns of a Jacobian.
 
-        Jacobians, after the rows are reordered:
-
-            converted result = result @ inverse
-            converted scale = scale @ |inverse|
+        converted result = result @ inverse
+        converted scale = scale @ |inverse|
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
@@ -566,11 +563,7 @@ class _Run:
     def _call_function(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
-        """Call the user's function once with `batch`, otherwise once for each configuration.
-
-        Returns:
-            The valid results, and the indices of their configurations.
-        """
+        """Return the valid results, and their indices in the batch."""
         n = len(inputs[0])
         if self.batch:
             array = _try_call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
@@ -700,9 +693,9 @@ def _try_call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Call the function, and return a copy of the result.
+    """After an exception or an invalid result, add a message to `total` and return None.
 
-    After an exception or an invalid result, add a message to `total` and return None.
+    The result is copied, because the function may reuse its arrays.
     """
     try:
         result = function(*inputs)

@@ -42,10 +42,11 @@ if TYPE_CHECKING:
 
 #: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum number of quoted bytes of the program's standard error.
+#: Maximum length of a quoted text: bytes of the program's standard error, or characters of `error`.
 _MAX_ERROR_BYTES = 300
 #: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
+#: One day, s.
 _MAX_TIMEOUT = 86400.0
 
 
@@ -139,7 +140,9 @@ class Program:
         """Return the program's result for one configuration.
 
         Raises:
-            ProgramError: the program ended, took too long, or answered with an error or without a result.
+            ProgramError: the program ended, took too long, or answered with an error or without a result; or
+                it failed for the three preceding configurations.
+            SourceError: the program cannot be started again.
         """
         if self._failures >= _MAX_FAILURES:
             raise ProgramError(f"not called: the program failed {_MAX_FAILURES} times in a row")
@@ -185,7 +188,7 @@ class Program:
                 stream.close()
 
     def _request_answer(self, request: bytes) -> bytes:
-        """Write a request and read the answer, within the timeout."""
+        """Write and read at the same time, because a program may answer before it has read the request."""
         process = self._process
         assert process is not None
         assert process.stdin is not None
@@ -230,10 +233,7 @@ class Program:
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Return the answer as a dictionary.
-
-        Raise ProgramError unless the answer has a `result`, or an `error` that is a text.
-        """
+        """Raise ProgramError unless the answer has a `result`, or an `error` that is a text."""
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):

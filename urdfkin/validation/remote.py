@@ -68,11 +68,11 @@ def end_idle() -> None:
 
 
 class _CrashError(Exception):
-    """The process that ran a chunk crashed."""
+    """The text is the signal or exit status of the crashed process."""
 
 
 class _Parcel:
-    """A pickled robot and chunk. The receiver gets a `Chunk` that contains its `RobotInput`."""
+    """A pickled robot and a pickled chunk, which the receiver unpickles as one `Chunk`."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
@@ -87,10 +87,7 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 
 def _reuse_or_start() -> WorkerProcess:
-    """Return an idle process, or start a process.
-
-    An idle process may already have loaded the robot.
-    """
+    """Prefer an idle process, because it may already have loaded the robot."""
     with _idle_lock:
         while _idle:
             process = _idle.pop()

@@ -84,7 +84,7 @@ def _describe_joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -
 def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
     """Return the range of a mimicked joint within the limits of its mimic joints.
 
-    None means the joint's whole range.
+    None: the joint's whole range. The ends are None if the limits allow at most one value.
     """
     if narrowed is None:
         return None

@@ -5,7 +5,10 @@
     DIR/chunks/4f/4f1a....failed   reason why the robot of a chunk could not be checked
     DIR/accuracy.json              settings of the accuracy study
     DIR/chunks/4f/4f1a....accuracy result of the accuracy study of a robot
-    DIR/lock                       locked by the process that writes to the store
+    DIR/lock                       locked by each process that writes to the store
+    DIR/lock-2-of-4                locked by the process that computes shard 2/4
+    DIR/.writing/                  unfinished files
+    DIR/damaged/                   damaged and unknown files
 
 The manifest defines the robots, the samples, the versions, the chunks and the key of each chunk. The key is
 the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts or options
@@ -200,7 +203,7 @@ class Store:
             return None
 
     def write_answer(self, robot: int, index: int, answer: Answer) -> None:
-        """Write an answer; on return, the complete file is on disk."""
+        """Write an answer; the file's content is flushed to the disk before the file gets its name."""
         key = self.manifest.key(robot, index)
         self.write_entry(key, _FAILED if isinstance(answer, Failure) else _DONE, encode_answer(key, answer))
 
@@ -215,7 +218,11 @@ class Store:
             path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files with unknown names; a writable store moves them to `damaged/`."""
+        """Report files with unknown names; a writable store moves them to `damaged/`.
+
+        Results of the accuracy study are not reported: their names depend on settings that the manifest does
+        not contain.
+        """
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -373,15 +380,12 @@ def open_store(
 
 
 def _is_store_entry(path: Path) -> bool:
-    """Return whether a path has the name of a lock or folder of a store.
-
-    A new store gets its lock before its manifest.
-    """
+    """A new store gets its lock before its manifest, so a store without a manifest has only such names."""
     return path.name in (_SCRATCH_FOLDER, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Return the store with its manifest.
+    """Decide which manifest the store has.
 
     | case | result |
     |---|---|
@@ -429,7 +433,7 @@ def _hold_lock(folder: Path, shard: str | None) -> Iterator[None]:
 
 
 def _open_lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """Open the file of a lock; refuse links, pipes and devices."""
+    """Refuse links, pipes and devices."""
     message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -483,7 +487,10 @@ class FailedStudy:
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study; `moving_base` gives each root link a random motion."""
+    """Settings of the accuracy study.
+
+    With `moving_base`, the root link has a random motion in each sample; otherwise, it is fixed.
+    """
 
     samples: int
     seed: int

@@ -280,7 +280,7 @@ def make_configuration(
 
 
 def _format_tolerance(k: float, scale: float) -> str:
-    """Return k * eps * scale as a decimal, rounded up."""
+    """Return k * max(eps * scale, smallest subnormal number) as a decimal; "0" if the scale is 0."""
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_TOLERANCE_DIGITS):
@@ -408,7 +408,7 @@ def _write_vectors(
 
 
 def _format_result(one: Mapping[str, Any]) -> str:
-    """Return a result as JSON."""
+    """Return a result as JSON; `value` and `tolerance` are texts, which become numbers without rounding."""
     texts = {name: json_text(x) for name, x in one.items()}
     texts |= {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
@@ -430,10 +430,7 @@ def _compute_sample(
 def _compute_results(
     robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of a sample.
-
-    Results are intervals with `digits` digits. If an interval is too wide for 17 digits, the value is None.
-    """
+    """Compute intervals with `digits` digits; the value of an interval too wide for 17 digits is None."""
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:
         link = tree.frame_link(frame)

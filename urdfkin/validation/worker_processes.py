@@ -1,8 +1,8 @@
 """Engine that runs chunks in processes of this machine.
 
 The crash of a process affects only the robot that this process validates. A worker process is a new Python
-interpreter. A worker imports neither the parent's main module nor modules of the current folder, so a script
-needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot.
+interpreter. A worker does not import the parent's main module, so a script needs no `__main__` guard. A
+worker has one chunk at a time, so each crash can be attributed to a robot.
 
 If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
 separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
@@ -72,17 +72,13 @@ class WorkerProcess:
 
 
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """Start a Python interpreter with the same packages.
-
-    The interpreter has its own process group. Therefore, Ctrl-C interrupts only the parent, which saves the
-    finished results.
-    """
+    """The process has its own group, so Ctrl-C interrupts only the parent, which saves finished results."""
     command = python_command(f"from {WORKER_MODULE} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 
 
 def _signal_or_status(status: int) -> str:
-    """Return an exit status as text: the name of a signal, or the status as a number.
+    """Describe a return code of `Popen`: a negative code is the number of a signal.
 
     >>> _signal_or_status(-11), _signal_or_status(3)
     ('signal SIGSEGV', 'exit status 3')
@@ -114,7 +110,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Receive chunks, and end this process when the parent ends."""
+    """The pipe closes when the parent ends; then end this process."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -123,10 +119,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent process ends.
-
-    On Linux, the process ends even while compiled code hangs.
-    """
+    """On Linux, this process ends with its parent even while compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
