@@ -117,9 +117,8 @@ class FunctionCheck(Displayable):
             Jacobian of a robot without moving joints).
         errors: Number of configurations with an exception, or without real numbers in the right shape.
         first_errors: At most five exceptions and invalid results, with messages.
-        diagnoses: Possible causes of the differences: mistakes in the function, rounding, or results that are not
-            finite. Each mistake, or pair of mistakes, explains all results, or one column of a
-            Jacobian.
+        diagnoses: Possible causes of the differences: mistakes in the function, rounding, or results that are
+            not finite. Each mistake, or pair of mistakes, explains all results, or one column of a Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -519,10 +518,12 @@ class _Run:
         return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Reorder the rows, and convert the columns of a Jacobian.
+        """Convert the scale of a bound to the function's convention.
 
-        converted result = result @ inverse
-        converted scale = scale @ |inverse|
+        Jacobians, after the rows are reordered:
+
+            converted result = result @ inverse
+            converted scale = scale @ |inverse|
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
