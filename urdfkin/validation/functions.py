@@ -387,8 +387,9 @@ class _Run:
     conversion: Conversion | None = None
 
     def __post_init__(self) -> None:
-        self.recorder, self.recording = _RecordingVerifier(self.robot.verifier), copy(self.robot)
-        self.recording.verifier = cast("Verifier", self.recorder)
+        self.recording_verifier = _RecordingVerifier(self.robot.verifier)
+        self.recording_robot = copy(self.robot)
+        self.recording_robot.verifier = cast("Verifier", self.recording_verifier)
 
     def check(self) -> FunctionCheck:
         robot = self.robot
@@ -454,8 +455,8 @@ class _Run:
     ) -> _FunctionResults:
         row = self.row
         native_inputs = drawn[: len(row.inputs)]
-        result = self._call_method(self.recording, native_inputs, self.frame, None, verify=has_oracle)
-        call = self.recorder.calls[row.name]
+        result = self._call_method(self.recording_robot, native_inputs, self.frame, None, verify=has_oracle)
+        call = self.recording_verifier.calls[row.name]
         with_frame_axis = result[:, None]
         part = call.select(slice(0, call.n))
         oracle_results, bound = None, None
@@ -612,7 +613,7 @@ class _Run:
         yield from diagnose(mistakes, case)
 
     def _make_replay_line(self, native_inputs: tuple[FloatArray, ...]) -> str:
-        call = copy(self.recorder.calls[self.row.name])
+        call = copy(self.recording_verifier.calls[self.row.name])
         q, *rates = (x[None] for x in native_inputs)
         call.q, call.rates, call.shape, call.n = q, rates, (1,), 1
         return self.robot.verifier._make_replay_line(self.row, call, 0, self.frame)

@@ -41,7 +41,7 @@ def describe(robot: Robot) -> ReportedModel:
     (6, True)
     """
     tree = robot.tree
-    narrowed = {one.joint: one for one in range_reductions(tree)}
+    reductions = {one.joint: one for one in range_reductions(tree)}
     data = {
         "name": robot.name,
         "source": robot.source,
@@ -57,12 +57,12 @@ def describe(robot: Robot) -> ReportedModel:
         "rates": robot.velocity_names,
         "frames": robot.frame_names,
         "links": robot.link_names,
-        "joints": [_describe_joint(robot, i, narrowed) for i in range(len(tree.joints))],
+        "joints": [_describe_joint(robot, i, reductions) for i in range(len(tree.joints))],
     }
     return cast("ReportedModel", as_json_data(data))
 
 
-def _describe_joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[str, Any]:
+def _describe_joint(robot: Robot, i: int, reductions: dict[str, RangeReduction]) -> dict[str, Any]:
     tree = robot.tree
     joint = tree.joints[i]
     return {
@@ -76,20 +76,20 @@ def _describe_joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": joint.limit,
         "mimic": joint.mimic,
-        "remaining_range": _remaining_range(narrowed.get(joint.name)),
+        "remaining_range": _remaining_range(reductions.get(joint.name)),
         **({} if joint.lock is None else {"locked": joint.lock.value}),
     }
 
 
-def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
+def _remaining_range(reduction: RangeReduction | None) -> dict[str, Any] | None:
     """Return the range of a mimicked joint within the limits of its mimic joints.
 
     None: the joint's whole range. The ends are None if the limits allow at most one value.
     """
-    if narrowed is None:
+    if reduction is None:
         return None
-    lower, upper = narrowed.allowed_range or (None, None)
-    return {"lower": lower, "upper": upper, "by": narrowed.mimic_joints}
+    lower, upper = reduction.allowed_range or (None, None)
+    return {"lower": lower, "upper": upper, "by": reduction.mimic_joints}
 
 
 #: Maximum number of chains in a summary.
@@ -140,8 +140,8 @@ def _describe_tables(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTa
     }
     if oracle is None:
         return data | {"samples": 0, "metres": None, "worst": None, "bound_ratio": None}
-    drawn = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
-    checks = [check_table(oracle, robot.tree, table, drawn) for table in tables.values()]
+    samples = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
+    checks = [check_table(oracle, robot.tree, table, samples) for table in tables.values()]
     return data | {
         "samples": checks[0].samples,
         "metres": max(check.metres for check in checks),
@@ -161,8 +161,10 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = as_json_data(compare_with_yourdfpy(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
+        mimic, has_root_joint = robot.verifier.mimic, robot.root_joint is not None
+        reading = as_json_data(
+            compare_with_yourdfpy(robot.urdf, robot.tree, mimic=mimic, root_joint=has_root_joint)
+        )
         return cls(describe(robot), make_finding_entries(robot.findings), make_chains(robot, oracle), reading)
 
     @property

@@ -204,13 +204,11 @@ def load_features() -> Mapping[str, Feature]:
 
 
 def _make_feature(row: Mapping[str, Any], parts: Mapping[str, str]) -> Feature:
-    written = row.get("file") or _make_urdf(row)
+    text = row.get("file") or _make_urdf(row)
     for name, part in (*parts.items(), ("inertial", _INERTIAL)):
-        written = written.replace(f"{{{name}}}", part)
-    data = (row.get("head", "") + written).encode(row.get("encoding", "utf-8"))
-    return Feature(
-        row["name"], row["rule"], row.get("note"), written, data, tuple(row.get("frames", ("tip",)))
-    )
+        text = text.replace(f"{{{name}}}", part)
+    data = (row.get("head", "") + text).encode(row.get("encoding", "utf-8"))
+    return Feature(row["name"], row["rule"], row.get("note"), text, data, tuple(row.get("frames", ("tip",))))
 
 
 _INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -252,18 +250,18 @@ def make_configuration(
     The numbers depend only on the sample's index, and on the robot's name, joints and limits.
     """
     q, ranges = neutral(tree), coordinate_ranges(tree)
-    for joint, at in zip(tree.joints, tree.q_index, strict=True):
-        unit = [_hash_to_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
+    for joint, start in zip(tree.joints, tree.q_index, strict=True):
+        fractions = [_hash_to_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
         if joint.nq == 1:
             lower, upper = ranges[joint.name]
-            wanted = _round_to_grid(lower + (upper - lower) * unit[0]) if sample else 0.0
-            q[at] = min(max(wanted, lower), upper)
+            value = _round_to_grid(lower + (upper - lower) * fractions[0]) if sample else 0.0
+            q[start] = min(max(value, lower), upper)
         elif joint.kind is JointKind.FLOATING and sample:
-            quaternion = [2.0 * x - 1.0 for x in unit[3:]]
+            quaternion = [2.0 * x - 1.0 for x in fractions[3:]]
             length = math.sqrt(math.fsum(x * x for x in quaternion))
-            q[at + 3 : at + 7] = [x / length for x in quaternion]
+            q[start + 3 : start + 7] = [x / length for x in quaternion]
         if joint.nq > 1 and sample:
-            q[at : at + 3] = [_round_to_grid(_MAX_RANDOM * (2.0 * x - 1.0)) for x in unit[:3]]
+            q[start : start + 3] = [_round_to_grid(_MAX_RANDOM * (2.0 * x - 1.0)) for x in fractions[:3]]
     v, a = (
         np.array(
             [
@@ -407,10 +405,10 @@ def _write_vectors(
     return VectorFiles(header.robot, files, sum(len(one["value"]) for _, results in found for one in results))
 
 
-def _format_result(one: Mapping[str, Any]) -> str:
+def _format_result(result: Mapping[str, Any]) -> str:
     """Return a result as JSON; `value` and `tolerance` are texts, which become numbers without rounding."""
-    texts = {name: json_text(x) for name, x in one.items()}
-    texts |= {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
+    texts = {name: json_text(x) for name, x in result.items()}
+    texts |= {name: f"[{', '.join(result[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
 
 
@@ -435,14 +433,14 @@ def _compute_results(
     for frame in frames:
         link = tree.frame_link(frame)
         plan, path = robot.plan((link,)), tree.path(link)
-        rows = q[np.newaxis], v[np.newaxis], a[np.newaxis]
-        size = true_value_magnitudes(plan, *rows, conversion_errors(robot.urdf, tree, path, rows[0]))
+        batch = q[np.newaxis], v[np.newaxis], a[np.newaxis]
+        magnitudes = true_value_magnitudes(plan, *batch, conversion_errors(robot.urdf, tree, path, batch[0]))
         with precision(digits):
             motion = compute_motion(tree, read_exact_joints(robot.urdf, tree, path), q, v, a)
             for row in QUANTITIES:
                 for reference in row.references:
                     yield _make_result_entry(
-                        row, motion, link, reference, frame, row.bound(plan, size, reference)
+                        row, motion, link, reference, frame, row.bound(plan, magnitudes, reference)
                     )
 
 
