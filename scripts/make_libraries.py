@@ -26,13 +26,13 @@ import platformdirs
 import urdfkin
 from scripts.pages import DOCS, insert_parts, table
 from urdfkin.comparison.readers import joint_values
-from urdfkin.validation.vectors import Feature, features
+from urdfkin.validation.vectors import Feature, load_features
 from urdfkin.verify import adapters
 from urdfkin.verify.adapters import LIBRARIES
 
 PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
-FEATURES = {name: features()[name] for name in DATA["features"]}
+FEATURES = {name: load_features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
 #: Largest error of a correct pose (m, or rotation matrix entry).
 #: Rounding errors are below 1e-14.

@@ -29,15 +29,15 @@ GB = 10**9
 def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memory(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(memory, "BLOCK_BYTES", 1000)
+    monkeypatch.setattr(memory, "MAX_BLOCK_BYTES", 1000)
     for count, size, most in ((10, 300, 3), (9, 300, 3), (1, 300, 1), (5, 2000, 1), (0, 300, 0)):
         found = list(memory.blocks(count, size))
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
-    monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
+    monkeypatch.setattr(memory, "_find_free_bytes", lambda: iter([12 * GB, 8 * GB]))
     assert memory.limit() == 4 * GB
     assert memory.limit(4) == GB
-    monkeypatch.setattr(memory, "_free", lambda: iter([]))
+    monkeypatch.setattr(memory, "_find_free_bytes", lambda: iter([]))
     assert memory.limit() is None
 
 
@@ -49,7 +49,7 @@ def test_comparing_in_blocks_changes_no_number(
 ) -> None:
     (chunk,) = chunks(make_robot_input(source, None, root_joint), 5, 3)
     whole = run_chunk(chunk)
-    monkeypatch.setattr(memory, "BLOCK_BYTES", 2 * memory.frame_bytes(8, len(whole.joints)))
+    monkeypatch.setattr(memory, "MAX_BLOCK_BYTES", 2 * memory.frame_array_bytes(8, len(whole.joints)))
     parts = run_chunk(chunk)
     assert parts.error_stats == whole.error_stats
     assert list(parts.error_stats) == list(whole.error_stats)
@@ -70,7 +70,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
     for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
         for where in (evaluate, PinocchioOracle):
             monkeypatch.setattr(where, name, recorded(getattr(where, name)))
-    monkeypatch.setattr(memory, "BLOCK_BYTES", 100_000)
+    monkeypatch.setattr(memory, "MAX_BLOCK_BYTES", 100_000)
     (chunk,) = chunks(make_robot_input("talos"), 5, 3)
     run_chunk(chunk)
     assert len(sizes) > 100
@@ -163,7 +163,7 @@ def test_the_memory_limit_is_half_of_the_free_memory_of_the_machine_container_or
     files: dict[str, str], limit: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "_PROC", tmp_path / "proc")
-    monkeypatch.setattr(memory, "_GROUPS", tmp_path / "cgroup")
+    monkeypatch.setattr(memory, "_CGROUPS", tmp_path / "cgroup")
     monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -54,7 +54,7 @@ def test_an_error_of_a_robot_is_its_result_and_the_other_robots_are_verified(
     engine: str, error: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(faulty_worker.FAULT, error)
-    monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
+    monkeypatch.setattr(worker_processes, "WORKER_MODULE", faulty_worker.MODULE)
     monkeypatch.setattr(answer, "run_chunk", faulty_worker.run_faulty)
     report = validate(ROBOTS, samples=60, **ENGINES[engine]())
     assert verdicts(report) == ["verified", "not verified", "verified"]

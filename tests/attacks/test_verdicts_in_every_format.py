@@ -37,12 +37,12 @@ def _tables(monkeypatch: pytest.MonkeyPatch) -> Document:
 
 
 def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
-    right = robot_summary.chains_of
+    right = robot_summary.make_chains
 
     def without(*args: Any) -> tuple[Any, ...]:
         return tuple(chain | {"bound_ratio": None, "worst": None} for chain in right(*args))
 
-    monkeypatch.setattr(robot_summary, "chains_of", without)
+    monkeypatch.setattr(robot_summary, "make_chains", without)
     return _document("ur5")
 
 

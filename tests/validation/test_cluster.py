@@ -192,11 +192,14 @@ def test_a_robot_sent_to_a_worker_needs_no_file_and_no_catalogue_path(tmp_path: 
         with_text = pickle.loads(pickle.dumps(plain.with_text()))
         assert isinstance(with_text.source, bytes)
         path.unlink(missing_ok=True)
-        robot = with_text.read()
+        robot = with_text.make_robot()
         assert robot.source == source
         if source == "ur5":
-            assert (robot.base_frame, robot.tip_frame) == (plain.read().base_frame, plain.read().tip_frame)
-            assert {f.file for f in robot.findings} == {f.file for f in plain.read().findings}
+            assert (robot.base_frame, robot.tip_frame) == (
+                plain.make_robot().base_frame,
+                plain.make_robot().tip_frame,
+            )
+            assert {f.file for f in robot.findings} == {f.file for f in plain.make_robot().findings}
 
 
 def test_the_number_of_pending_chunks_is_bounded(two: Cluster) -> None:
@@ -234,7 +237,7 @@ def _start_processes_of(module: str, fault: str) -> None:
     from urdfkin.validation import remote, worker_processes
 
     os.environ[faulty_worker.FAULT] = fault
-    worker_processes.WORKER = module
+    worker_processes.WORKER_MODULE = module
     remote.end_idle()
 
 

@@ -412,6 +412,10 @@ def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_loc
     robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
     assert not verify_function(lambda q: np.eye(4), robot, "placement", samples=3).agrees
+    answers = iter([None, *[np.zeros((6, 0))] * 10])
+    found = verify_function(lambda q: next(answers), robot, "jacobian", samples=3)
+    assert (found.errors, found.worst) == (1, None)
+    assert "1 configuration without a usable result" in str(found)
     lock, frame = {"panda_joint3": 0.5}, "panda_rightfinger"
     robot = urdfkin.load("panda", lock=lock)
     function = without_mimic_columns(robot, frame, lock=lock)

@@ -22,7 +22,7 @@ from urdfkin.validation import robot_summary
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Timings
 from urdfkin.validation.results import RobotReport
-from urdfkin.validation.robot_summary import MOST, chains_of
+from urdfkin.validation.robot_summary import MAX_CHAINS, make_chains
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 
 def test_the_chains_of_a_catalogue_robot_are_its_limbs_checked_in_both_conventions() -> None:
     robot = urdfkin.load("talos")
-    chains: Any = chains_of(robot, robot.verifier.oracle())
+    chains: Any = make_chains(robot, robot.verifier.oracle())
     assert [chain["limb"] for chain in chains] == ["left_arm", "right_arm", "left_leg", "right_leg", "head"]
     for chain in chains:
         assert chain["samples"] >= 10
@@ -42,9 +42,9 @@ def test_the_chains_of_a_catalogue_robot_are_its_limbs_checked_in_both_conventio
 
 def test_other_robots_have_one_chain_to_a_leaf_for_each_set_of_joints() -> None:
     robot = urdfkin.load(urdfkin.load("talos").urdf)
-    chains = chains_of(robot, None)
+    chains = make_chains(robot, None)
     sets = [tuple(row["joint"] for row in chain["standard"]["rows"]) for chain in chains]
-    assert len(sets) == len(set(sets)) <= MOST
+    assert len(sets) == len(set(sets)) <= MAX_CHAINS
     assert all(chain["limb"] is None and chain["samples"] == 0 for chain in chains)
 
 
@@ -60,7 +60,7 @@ def test_computing_times_add_up_to_the_time_of_a_robot() -> None:
 @pytest.mark.parametrize("wrong", ["standard", "modified"])
 def test_a_wrong_table_of_one_convention_fails_the_robot(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("ur5")
-    (good,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
+    (good,) = cast("Any", make_chains(robot, robot.verifier.oracle()))
     shifted = np.eye(4)
     shifted[0, 3] = 1e-9
 
@@ -69,7 +69,7 @@ def test_a_wrong_table_of_one_convention_fails_the_robot(wrong: str, monkeypatch
         return replace(table, tool=table.tool @ shifted) if convention == wrong else table
 
     monkeypatch.setattr(robot_summary, "make_dh_table", shifted_table)
-    (bad,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
+    (bad,) = cast("Any", make_chains(robot, robot.verifier.oracle()))
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]
     assert bad["bound_ratio"] > 1.0 > good["bound_ratio"]

@@ -133,24 +133,24 @@ def test_changed_code_reuses_no_result_and_the_digest_covers_all_code_that_compu
     for place in ("kinematics/equations.py", "cli/validate.py", "urdf/lint/rules/joints.toml"):
         (package / place).parent.mkdir(parents=True)
         (package / place).write_text("1")
-    monkeypatch.setattr(results, "_PACKAGE", package)
-    digest = results._code()
+    monkeypatch.setattr(results, "_PACKAGE_FOLDER", package)
+    digest = results._digest_code()
     (package / "cli" / "validate.py").write_text("2")
-    assert results._code() == digest
+    assert results._digest_code() == digest
     for place in ("kinematics/equations.py", "urdf/lint/rules/joints.toml"):
         (package / place).write_text("2")
-        assert results._code() != digest
-        digest = results._code()
+        assert results._digest_code() != digest
+        digest = results._digest_code()
 
 
 def test_a_changed_file_is_an_error_and_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
     robot = robot_file(tmp_path / "a.urdf", "a")
     old = make_robot_input(str(robot))
     robot_file(robot, "b")
-    for read in (old.read, old.with_text):
+    for read in (old.make_robot, old.with_text):
         with pytest.raises(InputError, match="has changed since the validation began"):
             read()
-    assert make_robot_input(str(robot)).with_text().read().name == "b"
+    assert make_robot_input(str(robot)).with_text().make_robot().name == "b"
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(InputError, match="not empty and is not a store"):
         validate("ur5", samples=0, store=tmp_path)

@@ -29,7 +29,14 @@ from tests.urdf_standard import Robot, mp
 from tests.urdfs import joint, limit, mimic
 from urdfkin.system.resources import example_robots_dir, robots_dir
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.validation.vectors import VECTORS, features, file_stem, write_features, write_robot, write_sums
+from urdfkin.validation.vectors import (
+    VECTORS,
+    file_stem,
+    load_features,
+    write_features,
+    write_robot,
+    write_sums,
+)
 from urdfkin.verify.adapters import LIBRARIES
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
@@ -135,7 +142,7 @@ def own(robot: urdfkin.Robot) -> Callable[..., Any]:
 
 
 def test_the_errors_of_urdfkin_are_at_most_a_twentieth_of_the_tolerances(folder: Path) -> None:
-    for name, feature in features().items():
+    for name, feature in load_features().items():
         path = folder / f"{file_stem(name)}.json"
         answer = own(urdfkin.load(feature.text, verify=False))
         data = document(path)
@@ -260,7 +267,7 @@ def demand_the_tolerances_of_the_page(path: Path) -> None:
             assert np.all(given <= expected * 1.0101), where
 
 
-@pytest.mark.parametrize("name", features())
+@pytest.mark.parametrize("name", load_features())
 def test_the_formulas_on_the_page_give_every_tolerance(name: str, folder: Path) -> None:
     demand_the_tolerances_of_the_page(folder / f"{file_stem(name)}.json")
 
@@ -431,7 +438,7 @@ def test_both_file_formats_have_the_same_numbers_and_conform_to_the_schema(folde
         data = document(path)
         jsonschema.validate(data, schema)
         VECTORS.read(path)
-        feature = features()[data["robot"]]
+        feature = load_features()[data["robot"]]
         assert data["sha256"] == hashlib.sha256((folder / data["file"]).read_bytes()).hexdigest()
         assert (data["rule"], data["note"], data["license"]) == (feature.rule, feature.note, "CC0-1.0")
         rows = [line.split("\t") for line in path.with_suffix(".tsv").read_text("utf-8").splitlines()[3:]]
@@ -452,7 +459,7 @@ def test_files_are_equal_in_a_process_with_a_different_hash_seed(folder: Path, t
         env={**os.environ, "PYTHONHASHSEED": "4711", "LC_ALL": "C"}, stdout=subprocess.DEVNULL, check=True,
     )  # fmt: skip
     assert (tmp_path / "SHA256SUMS").read_bytes() == (folder / "SHA256SUMS").read_bytes()
-    assert len(list(tmp_path.iterdir())) == 3 * len(features()) + 1
+    assert len(list(tmp_path.iterdir())) == 3 * len(load_features()) + 1
     subprocess.run(["sha256sum", "--quiet", "--check", "SHA256SUMS"], cwd=tmp_path, check=True)
 
 
@@ -463,21 +470,21 @@ def test_files_of_all_features_and_robots_are_equal_if_written_twice(tmp_path: P
         assert run("vectors write", str(made)).code == 0
     assert (first / "SHA256SUMS").read_bytes() == (second / "SHA256SUMS").read_bytes()
     found = [document(path) for path in first.glob("*.json")]
-    assert len(found) == len(features()) + len(catalogue())
+    assert len(found) == len(load_features()) + len(catalogue())
     assert all(one["k"] * EPS < 1e-10 for data in found for one in data["samples"][1]["results"])
 
 
 def test_features_have_unique_names_and_notes_on_libraries_that_differ() -> None:
-    assert len(features()) >= 60
-    names = [file_stem(name).casefold() for name in (*features(), *catalogue())]
+    assert len(load_features()) >= 60
+    names = [file_stem(name).casefold() for name in (*load_features(), *catalogue())]
     assert len(set(names)) == len(names)
-    assert len({feature.data for feature in features().values()}) == len(features())
+    assert len({feature.data for feature in load_features().values()}) == len(load_features())
     table = document(ROOT / "docs" / "libraries.json")["cells"]
     for library, column in table.items():
         for name, cell in column.items():
-            named = LIBRARIES[library].title in (features()[name].note or "")
+            named = LIBRARIES[library].title in (load_features()[name].note or "")
             assert named == (cell["verdict"] != "right"), (library, name)
-    for feature in features().values():
+    for feature in load_features().values():
         try:
             urdfkin.load(feature.data, verify=False)
         except urdfkin.UrdfError:

@@ -35,7 +35,7 @@ HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolat
 @pytest.fixture
 def crashes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A file with the number of times that the robot ur5 crashes its process."""
-    monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
+    monkeypatch.setattr(worker_processes, "WORKER_MODULE", faulty_worker.MODULE)
     monkeypatch.setenv(faulty_worker.FAULT, str(tmp_path / "crashes"))
     return tmp_path / "crashes"
 
@@ -74,7 +74,7 @@ def test_a_robot_that_crashed_one_process_is_retried_and_verified_in_full(crashe
 
 @pytest.mark.long
 def test_an_interrupt_kills_processes_that_hang_in_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
+    monkeypatch.setattr(worker_processes, "WORKER_MODULE", faulty_worker.MODULE)
     monkeypatch.setenv(faulty_worker.FAULT, "hang")
     started: list[Any] = []
     right = worker_processes._start_interpreter
@@ -146,7 +146,7 @@ def test_killed_processes_change_no_result(monkeypatch: pytest.MonkeyPatch, tmp_
     monkeypatch.setattr(engines, "answer_chunk", store_answer)
     monkeypatch.setattr(memory, "limit", lambda *_: None)  # the limit is part of a chunk, and would change
     expected = numbers(validate(robots, samples=100))
-    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.canned_worker")
+    monkeypatch.setattr(worker_processes, "WORKER_MODULE", "tests.validation.canned_worker")
     monkeypatch.setenv("URDFKIN_TEST_ANSWERS", str(tmp_path))
     killed, others = 0, set(children(os.getpid()))  # processes of other tests
     for seed in range(20):

@@ -122,7 +122,9 @@ def _study_accuracy(
         if is_same := sha256 in (None, robot.sha256):
             rng = np.random.default_rng([settings.seed, 1])
             base = draw_base_motion(settings.samples, rng) if settings.moving_base else None
-            return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
+            return accuracy_study(
+                robot.make_robot(), samples=settings.samples, seed=settings.seed, base=base
+            ), True
         raise InputError(
             "the robot file has changed since the validation read the file",
             remedy="start the validation again when the file no longer changes",

@@ -24,7 +24,7 @@ from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.error_stats import ErrorStats, Key
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entries_of
+from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, make_finding_entries
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def make_failure(robot_input: RobotInput, error: Exception) -> Failure:
     if not isinstance(error, UrdfkinError):
         return make_unexpected_failure(error)
     if isinstance(error, UrdfError):
-        summary = RobotSummary(findings=entries_of(error.findings))
+        summary = RobotSummary(findings=make_finding_entries(error.findings))
     else:
         summary = _unchecked_summary(robot_input)
     is_oracle = isinstance(error, OracleError)
@@ -68,7 +68,7 @@ def make_failure(robot_input: RobotInput, error: Exception) -> Failure:
 
 def _unchecked_summary(robot_input: RobotInput) -> RobotSummary:
     try:
-        return RobotSummary.of(robot_input.read(), None)
+        return RobotSummary.of(robot_input.make_robot(), None)
     except Exception:
         return EMPTY_SUMMARY
 

@@ -213,7 +213,7 @@ def compare_frames(
     """Return the error statistics of each quantity."""
     found: dict[Key, ErrorStats] = {}
     work = robot, oracle, x, first_sample, timings
-    for frames in memory.blocks(len(robot.all_frames), memory.frame_bytes(len(x.q), robot.nv)):
+    for frames in memory.blocks(len(robot.all_frames), memory.frame_array_bytes(len(x.q), robot.nv)):
         for key, part in _Block(*work, frames).compare(second):
             found[key] = found[key].join_frames(part) if key in found else part
     screws = reduce(ErrorStats.join_frames, _Screws(*work).compare())
@@ -317,7 +317,7 @@ class _Screws(_ComparisonBatch):
         ).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
-        for block in memory.blocks(len(moving), memory.frame_bytes(len(x.q), tree.nv)):
+        for block in memory.blocks(len(moving), memory.frame_array_bytes(len(x.q), tree.nv)):
             joints = moving[block]
             width = sum(tree.joints[i].kind.nv for i in joints)
             yield self._compare_block(tree, q_free, joints, oracle_results[:, column : column + width])

@@ -47,7 +47,7 @@ _DIAGNOSIS_SAMPLES = 48
 #: Maximum number of stored error messages.
 _MAX_MESSAGES = 5
 #: Largest relative difference that single precision can cause.
-_SINGLE_PRECISION = 1e-5
+_MAX_SINGLE_PRECISION_ERROR = 1e-5
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: The function's inputs: q, or q and v, or q, v and a.
-        bound: Largest allowed difference of each number.
+        bound: Largest allowed difference of each number: bound on rounding errors * `FunctionCheck.factor`.
         replay: A command or a line of Python that computes the expected result.
     """
 
@@ -76,16 +76,16 @@ class WorstResult:
     bound: FloatArray
     replay: str
 
-    def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
+    def describe_largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
         """Describe the number with the largest ratio of difference to bound."""
         with np.errstate(all="ignore"):
-            over = np.abs(self.actual - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
-        flat = int(np.nan_to_num(over, nan=np.inf).argmax())
-        at = tuple(int(i) for i in np.unravel_index(flat, over.shape))
-        names = [rows[at[0]], *(columns[k] if columns else f"column {k}" for k in at[1:])]
+            ratios = np.abs(self.actual - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
+        flat_index = int(np.nan_to_num(ratios, nan=np.inf).argmax())
+        index = tuple(int(i) for i in np.unravel_index(flat_index, ratios.shape))
+        names = [rows[index[0]], *(columns[k] if columns else f"column {k}" for k in index[1:])]
         return (
-            f"The number {', '.join(names)} is {self.actual[at]:.17g}; {self.expected[at]:.17g} was expected,"
-            f" within {self.bound[at]:.2g}."
+            f"The number {', '.join(names)} is {self.actual[index]:.17g}; {self.expected[index]:.17g} was"
+            f" expected, within {self.bound[index]:.2g}."
         )
 
 
@@ -113,11 +113,12 @@ class FunctionCheck(Displayable):
         rows: The dictionary {name of the row: `bound_ratio` of the row}, for example {"vx": 0.2}.
         columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for a
             result without such columns, for example a placement.
-        worst: The worst result; None if no result was compared.
+        worst: The worst result; None if no result was compared, or if the results contain no numbers (a
+            Jacobian of a robot without moving joints).
         errors: Number of configurations with an exception, or without real numbers in the right shape.
-        first_errors: The first exceptions and invalid results, with messages.
-        diagnoses: Possible mistakes in the function. Each mistake, or pair of mistakes, explains all results,
-            or one column of a Jacobian.
+        first_errors: At most five exceptions and invalid results, with messages.
+        diagnoses: Possible causes of the differences: mistakes in the function, rounding, or results that are
+            not finite. Each mistake, or pair of mistakes, explains all results, or one column of a Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -207,33 +208,31 @@ class FunctionCheck(Displayable):
             parts += self._list_first_errors()
         if not self.agrees:
             parts += [f"Diagnosis: {words}." for words in self.diagnoses]
-        if not self.agrees and self.compared:
-            parts += self._describe_worst()
+        if not self.agrees and self.worst is not None:
+            parts += self._describe_worst(self.worst)
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
 
     def _list_first_errors(self) -> Iterator[str]:
-        """Yield each different message with the indices of its samples."""
         for message in dict.fromkeys(error.message for error in self.first_errors):
             samples = [str(error.sample) for error in self.first_errors if error.message == message]
             yield f"  sample{'s' if len(samples) > 1 else ''} {', '.join(samples)}: {message}"
 
-    def _describe_worst(self) -> Iterator[str | Table]:
+    def _describe_worst(self, worst: WorstResult) -> Iterator[str | Table]:
         for title, ratios in (("row", self.rows), ("column", self.columns)):
             wrong = [(name, f"{ratio:.3g}") for name, ratio in ratios.items() if not ratio <= 1.0]
             if wrong and len(wrong) < len(ratios):
                 yield Table((title, "of the bound"), wrong)
             elif wrong:
                 yield f"Every {title} differs."
-        assert self.worst is not None
-        yield self.worst.largest(tuple(self.rows), tuple(self.columns))
-        yield f"Worst result: sample {self.worst.sample}, with"
-        for letter, values in zip("qva", self.worst.inputs, strict=False):
+        yield worst.describe_largest(tuple(self.rows), tuple(self.columns))
+        yield f"Worst result: sample {worst.sample}, with"
+        for letter, values in zip("qva", worst.inputs, strict=False):
             yield f"  {letter} = [{', '.join(map(repr, values.tolist()))}]"
-        yield f"  the expected result: {self.worst.replay}"
+        yield f"  the expected result: {worst.replay}"
 
 
-class _Recorder:
-    """A verifier that stores the inputs of the latest call of each quantity."""
+class _RecordingVerifier:
+    """A verifier that stores the latest call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -275,7 +274,7 @@ def verify_function(
         robot: The robot whose kinematics the function computes.
         quantity: Name of the quantity: "placement", "velocity", "jacobian", "jacobian rate", "hessian",
             "acceleration", "relative placement", "analytical jacobian" or "imu".
-        frame: Name of a link or joint; None: the robot's only tip.
+        frame: Name of a link or joint; None: the default tip, `robot.tip_frame`.
         reference: Reference frame of the result.
         convention: Convention of the function's inputs and results, in a form that `Robot.convention`
             accepts. None: urdfkin's convention.
@@ -344,14 +343,16 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """The results of a user's function and of urdfkin.
+    """Results for a batch of configurations, of which n have a valid result of the user's function.
 
     Attributes:
-        valid_indices: Indices of the n configurations with a valid result.
+        first: Index of the batch's first configuration in the whole check.
+        inputs: Inputs of all configurations of the batch, in the function's convention.
+        valid_indices: (n,) indices in the batch.
         actual: (n, ...) results of the function.
         expected: (n, ...) results of urdfkin.
-        scale: Scale of each number. The bound is k * eps * scale.
-        k: (n,) factor of the bound.
+        scale: (n, ...) scale of each number. The allowed difference is k * eps * scale.
+        k: (n,) `FunctionCheck.factor` included.
     """
 
     first: int
@@ -386,30 +387,32 @@ class _Run:
     conversion: Conversion | None = None
 
     def __post_init__(self) -> None:
-        self.recorder, self.recording = _Recorder(self.robot.verifier), copy(self.robot)
-        self.recording.verifier = cast("Verifier", self.recorder)
+        self.recording_verifier = _RecordingVerifier(self.robot.verifier)
+        self.recording_robot = copy(self.robot)
+        self.recording_robot.verifier = cast("Verifier", self.recording_verifier)
 
     def check(self) -> FunctionCheck:
         robot = self.robot
         drawn = draw_samples(
             robot.tree, self.samples, np.random.default_rng(self.seed), with_zero_and_limits=True
         )
-        total = _Total(self._row_names(), self._column_names())
-        checked = robot.verifier.find_refusal(None, robot.verifier.library) is None
+        total = _Total(self._list_row_names(), self._list_column_names())
+        has_oracle = robot.verifier.find_refusal(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH_SIZE):
             part = slice(first, first + _BATCH_SIZE)
-            total.add(self._compare(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
-        return self._result(total, len(drawn.q), checked)
+            total.add(
+                self._compute_batch(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, has_oracle)
+            )
+        return self._make_check(total, len(drawn.q), has_oracle)
 
-    def _result(self, total: _Total, samples: int, checked: bool) -> FunctionCheck:
+    def _make_check(self, total: _Total, samples: int, has_oracle: bool) -> FunctionCheck:
         robot = self.robot
         diagnoses: tuple[str, ...] = ()
         if total.bound_ratio > 1.0 or total.errors:
-            diagnoses = tuple(self._diagnoses(total))
+            diagnoses = tuple(self._find_diagnoses(total))
         worst = total.worst
         if worst is not None:
-            values = self._native_inputs(worst.inputs)
-            worst = replace(worst, replay=self._replay(values))
+            worst = replace(worst, replay=self._make_replay_line(self._to_native_inputs(worst.inputs)))
         return FunctionCheck(
             getattr(self.function, "__name__", type(self.function).__name__),
             robot.name,
@@ -417,13 +420,13 @@ class _Run:
             self.frame,
             None if self.reference is None else self.reference.name.lower(),
             None if self.conversion is None else self.conversion.convention.name,
-            robot.certificate().oracle if checked else "",
+            robot.certificate().oracle if has_oracle else "",
             samples,
             total.compared,
             self.factor,
             total.eps_scale,
             total.bound_ratio,
-            total.oracle_bound_ratio if checked else None,
+            total.oracle_bound_ratio if has_oracle else None,
             dict(zip(total.row_names, total.by_row.tolist(), strict=True)),
             dict(zip(total.column_names, total.by_column.tolist(), strict=True)),
             worst,
@@ -440,49 +443,46 @@ class _Run:
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
-        """Compute urdfkin's results, without verification.
-
-        Inputs and results are in the function's convention.
-        """
-        native_inputs = self._native_inputs(inputs)
+        """Inputs and results are in the function's convention; the results are not verified."""
+        native_inputs = self._to_native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
-            found = self._method(self.robot, native_inputs, frame or self.frame, reference, verify=False)
-            return self._convert(native_inputs, found, frame, reference)
+            found = self._call_method(self.robot, native_inputs, frame or self.frame, reference, verify=False)
+            return self._convert_result(native_inputs, found, frame, reference)
 
-    def _compare(
-        self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool
+    def _compute_batch(
+        self, first: int, drawn: tuple[FloatArray, ...], total: _Total, has_oracle: bool
     ) -> _FunctionResults:
         row = self.row
         native_inputs = drawn[: len(row.inputs)]
-        result = self._method(self.recording, native_inputs, self.frame, None, verify=checked)
-        call = self.recorder.calls[row.name]
-        flat = result[:, None]
+        result = self._call_method(self.recording_robot, native_inputs, self.frame, None, verify=has_oracle)
+        call = self.recording_verifier.calls[row.name]
+        with_frame_axis = result[:, None]
         part = call.select(slice(0, call.n))
         oracle_results, bound = None, None
-        if checked:
+        if has_oracle:
             oracle = self.robot.verifier.oracle(call.base, self.robot.verifier.library)
             oracle_results, bound = compute_oracle_results_with_bound(
-                row, oracle, part, flat, self.robot.verifier.library
+                row, oracle, part, with_frame_axis, self.robot.verifier.library
             )
         else:
             bound = compute_bound(row, part)
-        scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
-        k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
-        expected = self._convert(native_inputs, result)
+        scale = np.broadcast_to(bound.scale, with_frame_axis.shape)[:, 0]
+        k = result_k(bound, with_frame_axis.shape[:2])[:, 0] * self.factor
+        expected = self._convert_result(native_inputs, result)
         inputs: tuple[FloatArray, ...] = native_inputs
         if self.conversion is not None:
             inputs = as_tuple(self.conversion.to(*native_inputs))
             scale = self._convert_scale(native_inputs, scale)
-            k = k + self._rounding_of_the_conversion(native_inputs[0]) * self.factor
+            k = k + self._compute_conversion_k(native_inputs[0]) * self.factor
         actual, valid = self._call_function(inputs, expected.shape[1:], first, total)
         if oracle_results is not None:
-            oracle_results = self._convert(native_inputs, np.asarray(oracle_results)[:, 0])[valid]
+            oracle_results = self._convert_result(native_inputs, np.asarray(oracle_results)[:, 0])[valid]
         return _FunctionResults(
             first, inputs, valid, actual, expected[valid], scale[valid], k[valid], oracle_results
         )
 
-    def _method(
+    def _call_method(
         self,
         robot: Robot,
         native_inputs: Sequence[FloatArray],
@@ -492,15 +492,17 @@ class _Run:
         verify: bool,
     ) -> FloatArray:
         reference = self.reference if reference is None else reference
-        named = {} if self.reference is None else {"reference": reference}
+        reference_argument = {} if self.reference is None else {"reference": reference}
         method = getattr(robot, self.row.method)
-        found: FloatArray = method(*native_inputs, frame=frame, verify=verify, **named, **self.options)
-        return found
+        result: FloatArray = method(
+            *native_inputs, frame=frame, verify=verify, **reference_argument, **self.options
+        )
+        return result
 
-    def _native_inputs(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    def _to_native_inputs(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
         return tuple(inputs) if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
-    def _convert(
+    def _convert_result(
         self,
         native_inputs: Sequence[FloatArray],
         result: FloatArray,
@@ -539,12 +541,12 @@ class _Run:
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
         inverse = np.abs(conversion.inverse_matrix(native_inputs[0]))
-        found: FloatArray = np.asarray(
+        converted: FloatArray = np.asarray(
             scale @ inverse if name != "hessian" else np.einsum("nrkl,ki,lj->nrij", scale, inverse, inverse)
         )
-        return found
+        return converted
 
-    def _rounding_of_the_conversion(self, q: FloatArray) -> float:
+    def _compute_conversion_k(self, q: FloatArray) -> float:
         """Return k; the rounding error of the conversion is at most k * eps * scale.
 
         Reordering has no rounding errors. Computed angles, for example degrees from radians, are rounded:
@@ -563,25 +565,21 @@ class _Run:
     def _call_function(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
-        """Call the user's function once with `batch`, otherwise once for each configuration.
-
-        Returns:
-            The valid results, and the indices of their configurations.
-        """
+        """Return the valid results, and their indices in the batch."""
         n = len(inputs[0])
         if self.batch:
-            array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
+            array = _try_call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
             return (np.zeros((0, *shape)), []) if array is None else (array, list(range(n)))
         found = dict[int, FloatArray]()
         for k in range(n):
-            array = _call(self.function, [x[k].copy() for x in inputs], shape, first + k, total, 1)
+            array = _try_call(self.function, [x[k].copy() for x in inputs], shape, first + k, total, 1)
             if array is not None:
                 found[k] = array
         return np.array(list(found.values())).reshape(len(found), *shape), list(found)
 
     # -- explanations --------------------------------------------------------------------------------
 
-    def _diagnoses(self, total: _Total) -> Iterator[str]:
+    def _find_diagnoses(self, total: _Total) -> Iterator[str]:
         if total.wrong_shapes and not total.compared:
             shape = next(iter(total.wrong_shapes))
             if len(shape) > 1 and shape == total.shape[::-1]:
@@ -594,7 +592,7 @@ class _Run:
             return
         if total.bound_ratio <= 1.0:  # All differences are within their bounds.
             return
-        if total.eps_scale * EPS <= _SINGLE_PRECISION and math.isfinite(total.bound_ratio):
+        if total.eps_scale * EPS <= _MAX_SINGLE_PRECISION_ERROR and math.isfinite(total.bound_ratio):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
             yield (
                 f"rounding in {precision} precision explains all differences: the largest difference is"
@@ -603,30 +601,31 @@ class _Run:
             )
             return
         mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
-        some = slice(_DIAGNOSIS_SAMPLES)
-        inputs = tuple(x[first_batch.valid_indices[some]] for x in first_batch.inputs)
+        first = slice(_DIAGNOSIS_SAMPLES)
+        inputs = tuple(x[first_batch.valid_indices[first]] for x in first_batch.inputs)
         case = Diagnosis(
             inputs,
-            first_batch.actual[some],
-            first_batch.expected[some],
-            first_batch.scale[some],
+            first_batch.actual[first],
+            first_batch.expected[first],
+            first_batch.scale[first],
             self.compute_expected,
         )
         yield from diagnose(mistakes, case)
 
-    def _replay(self, values: tuple[FloatArray, ...]) -> str:
-        one = copy(self.recorder.calls[self.row.name])
-        one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
-        return self.robot.verifier._make_replay_line(self.row, one, 0, self.frame)
+    def _make_replay_line(self, native_inputs: tuple[FloatArray, ...]) -> str:
+        call = copy(self.recording_verifier.calls[self.row.name])
+        q, *rates = (x[None] for x in native_inputs)
+        call.q, call.rates, call.shape, call.n = q, rates, (1,), 1
+        return self.robot.verifier._make_replay_line(self.row, call, 0, self.frame)
 
-    def _row_names(self) -> tuple[str, ...]:
+    def _list_row_names(self) -> tuple[str, ...]:
         row = self.row
         angular_first = self.conversion is not None and self.conversion.angular_first
         labels = row.labels[3:] + row.labels[:3] if angular_first and len(row.labels) == 6 else row.labels
         nv = (self.conversion or self.robot).nv
         return labels or tuple(f"row {k}" for k in range(row.result_shape(nv)[0]))
 
-    def _column_names(self) -> tuple[str, ...]:
+    def _list_column_names(self) -> tuple[str, ...]:
         if not self.row.has_columns:
             return ()
         return (self.conversion or self.robot).velocity_names
@@ -651,44 +650,44 @@ class _Total:
     def __post_init__(self) -> None:
         self.by_row, self.by_column = np.zeros(len(self.row_names)), np.zeros(len(self.column_names))
 
-    def error(self, sample: int, message: str, configurations: int) -> None:
+    def add_error(self, sample: int, message: str, configurations: int) -> None:
         self.errors += configurations
         if len(self.first_errors) < _MAX_MESSAGES:
             self.first_errors.append(FunctionError(sample, message))
 
-    def add(self, part: _FunctionResults) -> None:
-        self.shape = part.expected.shape[1:]
-        if not part.valid_indices:
+    def add(self, batch: _FunctionResults) -> None:
+        self.shape = batch.expected.shape[1:]
+        if not batch.valid_indices:
             return
-        self.compared += len(part.valid_indices)
-        ratios, units = part.bound_ratios(part.expected), part.units(part.expected)
+        self.compared += len(batch.valid_indices)
+        ratios, units = batch.bound_ratios(batch.expected), batch.units(batch.expected)
         self.eps_scale = max(self.eps_scale, float(units.max(initial=0.0)))
-        own = tuple(range(1, ratios.ndim))
-        self.not_finite += int((~np.isfinite(part.actual).all(axis=own)).sum())
-        result_ratios = ratios.max(axis=own, initial=0.0)
-        self.by_row = np.maximum(self.by_row, ratios.max(axis=(0, *own[1:]), initial=0.0))
+        axes = tuple(range(1, ratios.ndim))
+        self.not_finite += int((~np.isfinite(batch.actual).all(axis=axes)).sum())
+        result_ratios = ratios.max(axis=axes, initial=0.0)
+        self.by_row = np.maximum(self.by_row, ratios.max(axis=(0, *axes[1:]), initial=0.0))
         if len(self.by_column):
-            self.by_column = np.maximum(self.by_column, ratios.max(axis=(0, 1, *own[2:]), initial=0.0))
+            self.by_column = np.maximum(self.by_column, ratios.max(axis=(0, 1, *axes[2:]), initial=0.0))
         if self.first_batch is None:
-            self.first_batch = part
-        if part.actual[0].size and (self.worst is None or result_ratios.max() > self.bound_ratio):
+            self.first_batch = batch
+        if batch.actual[0].size and (self.worst is None or result_ratios.max() > self.bound_ratio):
             k = int(result_ratios.argmax())
             self.worst = WorstResult(
-                part.first + part.valid_indices[k],
-                tuple(x[part.valid_indices[k]] for x in part.inputs),
-                part.actual[k],
-                part.expected[k],
-                EPS * part.k[k] * part.scale[k],
+                batch.first + batch.valid_indices[k],
+                tuple(x[batch.valid_indices[k]] for x in batch.inputs),
+                batch.actual[k],
+                batch.expected[k],
+                EPS * batch.k[k] * batch.scale[k],
                 "",
             )
         self.bound_ratio = max(self.bound_ratio, float(result_ratios.max()))
-        if part.oracle_results is not None:
+        if batch.oracle_results is not None:
             self.oracle_bound_ratio = max(
-                self.oracle_bound_ratio, float(part.bound_ratios(part.oracle_results).max(initial=0.0))
+                self.oracle_bound_ratio, float(batch.bound_ratios(batch.oracle_results).max(initial=0.0))
             )
 
 
-def _call(
+def _try_call(
     function: Callable[..., object],
     inputs: list[FloatArray],
     shape: tuple[int, ...],
@@ -696,26 +695,26 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Call the function, and return a copy of the result.
+    """After an exception or an invalid result, add a message to `total` and return None.
 
-    After an exception or an invalid result, add a message to `total` and return None.
+    The result is copied, because the function may reuse its arrays.
     """
     try:
         result = function(*inputs)
         if result is None:
-            total.error(sample, "the function returns None; is `return` missing?", configurations)
+            total.add_error(sample, "the function returns None; is `return` missing?", configurations)
             return None
-        given = np.asanyarray(result)
-        if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":
-            kind = "a masked array" if np.ma.isMaskedArray(given) else f"an array of {given.dtype}"
-            total.error(sample, f"{kind}, expected real numbers", configurations)
+        array = np.asanyarray(result)
+        if np.ma.isMaskedArray(array) or array.dtype.kind not in "fiu":
+            kind = "a masked array" if np.ma.isMaskedArray(array) else f"an array of {array.dtype}"
+            total.add_error(sample, f"{kind}, expected real numbers", configurations)
             return None
-        found = np.array(given, dtype=np.float64)
+        copied = np.array(array, dtype=np.float64)
     except (Exception, SystemExit) as error:  # The check reports exceptions of the user's code.
-        total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
+        total.add_error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
         return None
-    if found.shape != shape:
-        total.wrong_shapes.add(found.shape)
-        total.error(sample, f"shape {found.shape}, expected {shape}", configurations)
+    if copied.shape != shape:
+        total.wrong_shapes.add(copied.shape)
+        total.add_error(sample, f"shape {copied.shape}, expected {shape}", configurations)
         return None
-    return found
+    return copied

@@ -20,77 +20,84 @@ from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
 #: Maximum size (bytes) of an array of results; one frame's array can be larger.
-#: At most _ARRAYS such arrays exist at the same time.
-BLOCK_BYTES = 32 * 2**20
+#: At most _MAX_ARRAYS such arrays exist at the same time.
+MAX_BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
-_FRACTION = 0.5
-#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace, and _PER_LINK bytes for each link.
-#: Both constants were measured.
-_PER_CUBE, _PER_LINK = 64, 24_000
+_FREE_FRACTION = 0.5
+#: Measured: Pinocchio 4.1.0 needs _BYTES_PER_NV_CUBED * nv^3 bytes for its workspace, and
+#: _BYTES_PER_LINK bytes for each link.
+_BYTES_PER_NV_CUBED, _BYTES_PER_LINK = 64, 24_000
 #: Maximum number of arrays in memory at the same time; each contains the results of a block of frames.
-_ARRAYS = 12
+_MAX_ARRAYS = 12
 _PROC = Path("/proc")
-_GROUPS = Path("/sys/fs/cgroup")
+_CGROUPS = Path("/sys/fs/cgroup")
 
 
 def limit(processes: int = 1) -> int | None:
     """Return the memory (bytes) for each of `processes` processes; None if unknown."""
-    free = min(_free(), default=None)
-    return None if free is None else int(_FRACTION * free / processes)
+    free = min(_find_free_bytes(), default=None)
+    return None if free is None else int(_FREE_FRACTION * free / processes)
 
 
-def frame_bytes(samples: int, nv: int) -> int:
+def frame_array_bytes(samples: int, nv: int) -> int:
     """Return the bytes of one frame's largest array: (samples, 4, 4) or (samples, 6, nv)."""
     return samples * 8 * max(16, 6 * nv)
 
 
-def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `BLOCK_BYTES`, or of one item.
+def blocks(count: int, item_bytes: int) -> Iterator[slice]:
+    """Divide `count` items into slices of at most `MAX_BLOCK_BYTES`, or of one item.
 
     For zero items, yield one empty slice.
     """
-    most = max(1, BLOCK_BYTES // size)
-    for start in range(0, max(1, count), most):
-        yield slice(start, min(count, start + most))
+    items = max(1, MAX_BLOCK_BYTES // item_bytes)
+    for start in range(0, max(1, count), items):
+        yield slice(start, min(count, start + items))
 
 
 def estimate_bytes(tree: KinematicTree, samples: int) -> int:
     """Estimate the memory for a comparison, bytes."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
-    block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
-    return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
+    block = min(MAX_BLOCK_BYTES, 2 * links * frame_array_bytes(samples, nv))
+    return (
+        _BYTES_PER_NV_CUBED * nv**3
+        + _BYTES_PER_LINK * links
+        + _MAX_ARRAYS * max(block, frame_array_bytes(samples, nv))
+    )
 
 
-def check(tree: KinematicTree, samples: int, most: int | None) -> None:
-    wanted = estimate_bytes(tree, samples)
-    if most is not None and wanted > most:
+def check(tree: KinematicTree, samples: int, allowed_bytes: int | None) -> None:
+    needed_bytes = estimate_bytes(tree, samples)
+    if allowed_bytes is not None and needed_bytes > allowed_bytes:
         raise OracleError(
             "not enough memory to check the robot (all processes of a validation may use"
-            f" {_FRACTION:.0%} of the free memory)",
+            f" {_FREE_FRACTION:.0%} of the free memory)",
             where=tree.name,
-            found=f"{wanted / 1e9:.3g} GB needed, {most / 1e9:.3g} GB allowed for each process",
+            found=f"{needed_bytes / 1e9:.3g} GB needed,"
+            f" {allowed_bytes / 1e9:.3g} GB allowed for each process",
             remedy="use fewer jobs or a larger machine",
         )
 
 
-def _free() -> Iterator[int]:
+def _find_free_bytes() -> Iterator[int]:
     """Yield the free bytes: of the machine, of control groups, under RLIMIT_AS."""
-    for line in _lines(_PROC / "meminfo"):
+    for line in _read_lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
-    for line in _lines(_PROC / "self" / "cgroup"):
+    for line in _read_lines(_PROC / "self" / "cgroup"):
         _, controllers, group = line.split(":", 2)
         if not controllers:
-            yield from _group(_GROUPS, group, "memory.max", "memory.current")
+            yield from _find_group_free_bytes(_CGROUPS, group, "memory.max", "memory.current")
         elif "memory" in controllers.split(","):
-            yield from _group(_GROUPS / "memory", group, "memory.limit_in_bytes", "memory.usage_in_bytes")
-    most, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if most != resource.RLIM_INFINITY:
-        for line in _lines(_PROC / "self" / "statm"):
-            yield max(0, most - int(line.split()[0]) * resource.getpagesize())
+            yield from _find_group_free_bytes(
+                _CGROUPS / "memory", group, "memory.limit_in_bytes", "memory.usage_in_bytes"
+            )
+    address_space, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if address_space != resource.RLIM_INFINITY:
+        for line in _read_lines(_PROC / "self" / "statm"):
+            yield max(0, address_space - int(line.split()[0]) * resource.getpagesize())
 
 
-def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
+def _find_group_free_bytes(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
     """Yield the free memory of a control group and its parents, bytes.
 
     In a container, the highest visible control group is the container's own group.
@@ -99,16 +106,16 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
     for place in (folder, *folder.parents):
         if place == mount.parent:
             return
-        numbers = [line for file in (limit, usage) for line in _lines(place / file)]
+        numbers = [line for file in (limit, usage) for line in _read_lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
-            counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
+            counts = dict(line.split(maxsplit=1) for line in _read_lines(place / "memory.stat"))
             # Linux counts cached files as used memory.
             # Linux frees the memory of inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 
 
-def _lines(path: Path) -> list[str]:
+def _read_lines(path: Path) -> list[str]:
     try:
         return path.read_text("utf-8").splitlines()
     except (OSError, ValueError):

@@ -42,11 +42,12 @@ if TYPE_CHECKING:
 
 #: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum number of quoted bytes of the program's standard error.
+#: Maximum length of a quoted text: bytes of the program's standard error, or characters of `error`.
 _MAX_ERROR_BYTES = 300
 #: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
-_DAY = 86400.0
+#: One day, s.
+_MAX_TIMEOUT = 86400.0
 
 
 class ProgramError(Exception):
@@ -91,24 +92,26 @@ class Program:
     ) -> None:
         if not command:
             raise InputError("a program needs a command")
-        if not 0.0 < timeout <= _DAY:
-            raise InputError(f"the timeout must be above 0 and at most {_DAY:g} seconds", found=repr(timeout))
+        if not 0.0 < timeout <= _MAX_TIMEOUT:
+            raise InputError(
+                f"the timeout must be above 0 and at most {_MAX_TIMEOUT:g} seconds", found=repr(timeout)
+            )
         self.command, self.timeout = list(command), timeout
         self.__name__ = Path(command[0]).name
         names = robot if convention is None else robot.convention(convention)
-        self._fixed: dict[str, object] = {
+        self._request_entries: dict[str, object] = {
             "quantity": quantity,
             "frame": frame,
             "coordinates": list(names.coordinate_names),
         }
         if robot.origin.lock:
-            self._fixed["lock"] = dict(robot.origin.lock)
+            self._request_entries["lock"] = dict(robot.origin.lock)
         if robot.root_joint is not None:
-            self._fixed["root_joint"] = robot.root_joint
+            self._request_entries["root_joint"] = robot.root_joint
         if convention is not None:
-            self._fixed["convention"] = convention
+            self._request_entries["convention"] = convention
         if reference is not None:
-            self._fixed["reference"] = reference
+            self._request_entries["reference"] = reference
         self._urdf, self._failures = robot.urdf, 0
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -116,7 +119,7 @@ class Program:
         self._folder = tempfile.TemporaryDirectory(prefix="urdfkin-program-")
         path = Path(self._folder.name, "robot.urdf")
         path.write_text(self._urdf, encoding="utf-8")
-        self._fixed["robot"] = str(path)
+        self._request_entries["robot"] = str(path)
         try:
             self._start()
         except BaseException:
@@ -137,16 +140,18 @@ class Program:
         """Return the program's result for one configuration.
 
         Raises:
-            ProgramError: the program ended, took too long, or answered with an error or without a result.
+            ProgramError: the program ended, took too long, or answered with an error or without a result; or
+                it failed for the three preceding configurations.
+            SourceError: the program cannot be started again.
         """
         if self._failures >= _MAX_FAILURES:
             raise ProgramError(f"not called: the program failed {_MAX_FAILURES} times in a row")
         if self._process is None:
             self._start()
         values = {letter: x.tolist() for letter, x in zip("qva", inputs, strict=False)}
-        request = json_text({**self._fixed, **values}).replace("\n", " ") + "\n"
+        request = json_text({**self._request_entries, **values}).replace("\n", " ") + "\n"
         try:
-            answer = self._parse_answer(self._ask(request.encode()))
+            answer = self._parse_answer(self._request_answer(request.encode()))
         except ProgramError:
             self._failures += 1
             self._stop()  # A delayed answer would be read as the next request's answer.
@@ -157,10 +162,14 @@ class Program:
         return answer["result"]
 
     def _start(self) -> None:
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  The file must stay open while the process runs.
+        self._error_output: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  The file must stay open while the process runs.
         try:
             self._process = subprocess.Popen(
-                self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0
+                self.command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._error_output,
+                bufsize=0,
             )
         except OSError as error:
             raise SourceError(
@@ -173,24 +182,24 @@ class Program:
             return
         process.kill()
         process.wait()
-        for stream in (process.stdin, process.stdout, self._errors):
+        for stream in (process.stdin, process.stdout, self._error_output):
             assert stream is not None
             with suppress(OSError):
                 stream.close()
 
-    def _ask(self, request: bytes) -> bytes:
-        """Write a request and read the answer, within the timeout."""
+    def _request_answer(self, request: bytes) -> bytes:
+        """Write and read at the same time, because a program may answer before it has read the request."""
         process = self._process
         assert process is not None
         assert process.stdin is not None
         assert process.stdout is not None
-        end, sent, line = time.monotonic() + self.timeout, 0, bytearray()
+        deadline, sent, line = time.monotonic() + self.timeout, 0, bytearray()
         os.set_blocking(process.stdin.fileno(), False)
-        with selectors.DefaultSelector() as ready:
-            ready.register(process.stdin, selectors.EVENT_WRITE)
-            ready.register(process.stdout, selectors.EVENT_READ)
+        with selectors.DefaultSelector() as selector:
+            selector.register(process.stdin, selectors.EVENT_WRITE)
+            selector.register(process.stdout, selectors.EVENT_READ)
             while not line.endswith(b"\n"):
-                events = ready.select(max(0.0, end - time.monotonic()))
+                events = selector.select(max(0.0, deadline - time.monotonic()))
                 if not events:
                     self._stop()
                     raise ProgramError(f"no answer within {self.timeout:g} s; the program was stopped")
@@ -200,7 +209,7 @@ class Program:
                             sent += os.write(process.stdin.fileno(), request[sent : sent + 65536])
                             if sent < len(request):
                                 continue
-                        ready.unregister(process.stdin)
+                        selector.unregister(process.stdin)
                     elif part := os.read(process.stdout.fileno(), 65536):
                         line += part
                     else:
@@ -215,19 +224,16 @@ class Program:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
         status = self._process.poll()
-        self._errors.seek(0, os.SEEK_END)
-        self._errors.seek(max(0, self._errors.tell() - _MAX_ERROR_BYTES))
-        message = " ".join(self._errors.read(_MAX_ERROR_BYTES).decode(errors="replace").split())
+        self._error_output.seek(0, os.SEEK_END)
+        self._error_output.seek(max(0, self._error_output.tell() - _MAX_ERROR_BYTES))
+        message = " ".join(self._error_output.read(_MAX_ERROR_BYTES).decode(errors="replace").split())
         self._stop()
         how = "closed its output" if status is None else f"ended with exit code {status}"
         return f"the program {how}" + (f": {message}" if message else "")
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Return the answer as a dictionary.
-
-        Raise ProgramError unless the answer has a `result`, or an `error` that is a text.
-        """
+        """Raise ProgramError unless the answer has a `result`, or an `error` that is a text."""
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):

@@ -34,7 +34,7 @@ ChunkOutcome = (
 )
 
 _idle: list[WorkerProcess] = []
-_lock = threading.Lock()
+_idle_lock = threading.Lock()
 
 
 def store_robot(robot: bytes) -> bytes:
@@ -53,7 +53,7 @@ def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkO
     if client_provenance != provenance():
         return "other code", provenance()
     cause = ""
-    for start in (_idle_or_new, WorkerProcess):
+    for start in (_reuse_or_start, WorkerProcess):
         try:
             return "answer", _run_in(start(), _Parcel(robot, chunk))
         except _CrashError as crash:
@@ -62,17 +62,17 @@ def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkO
 
 
 def end_idle() -> None:
-    with _lock:
+    with _idle_lock:
         while _idle:
             _idle.pop().end()
 
 
 class _CrashError(Exception):
-    """The process that ran a chunk crashed."""
+    """The text is the signal or exit status of the crashed process."""
 
 
 class _Parcel:
-    """A pickled robot and chunk. The receiver gets a `Chunk` that contains its `RobotInput`."""
+    """A pickled robot and a pickled chunk, which the receiver unpickles as one `Chunk`."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
@@ -86,12 +86,9 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
     return replace(without_robot, robot_input=pickle.loads(robot))
 
 
-def _idle_or_new() -> WorkerProcess:
-    """Return an idle process, or start a process.
-
-    An idle process may already have loaded the robot.
-    """
-    with _lock:
+def _reuse_or_start() -> WorkerProcess:
+    """Prefer an idle process, because it may already have loaded the robot."""
+    with _idle_lock:
         while _idle:
             process = _idle.pop()
             if process.is_alive:
@@ -103,12 +100,12 @@ def _idle_or_new() -> WorkerProcess:
 def _run_in(process: WorkerProcess, parcel: _Parcel) -> bytes:
     try:
         process.connection.send(parcel)
-        found = process.connection.recv_bytes()
+        answer = process.connection.recv_bytes()
     except (EOFError, OSError):
         raise _CrashError(process.wait_for_cause()) from None
     except BaseException:
         process.end()
         raise
-    with _lock:
+    with _idle_lock:
         _idle.append(process)
-    return found
+    return answer

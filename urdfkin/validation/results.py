@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from urdfkin.validation.accuracy import AccuracyStudy
 
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 #: Packages that display results, but compute no results.
 #: A campaign can resume after a change of these packages.
-_DISPLAY = ("cli", "report", "view")
+_DISPLAY_PACKAGES = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
 
@@ -42,17 +42,17 @@ LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package 
 def provenance() -> dict[str, str]:
     """Return library versions, and digests of code and equations.
 
-    The digest of the code does not include the packages in `_DISPLAY`.
+    The digest of the code does not include the packages in `_DISPLAY_PACKAGES`.
     """
-    equations = hashlib.sha256(read_bytes(_PACKAGE / "kinematics" / "equations.py")).hexdigest()
-    return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
+    equations = hashlib.sha256(read_bytes(_PACKAGE_FOLDER / "kinematics" / "equations.py")).hexdigest()
+    return {name: version(name) for name in LIBRARIES} | {"code": _digest_code(), "equations": equations}
 
 
-def _code() -> str:
+def _digest_code() -> str:
     digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*")):
-        relative = path.relative_to(_PACKAGE)
-        if path.suffix in (".py", ".toml", ".json") and relative.parts[0] not in _DISPLAY:
+    for path in sorted(_PACKAGE_FOLDER.rglob("*")):
+        relative = path.relative_to(_PACKAGE_FOLDER)
+        if path.suffix in (".py", ".toml", ".json") and relative.parts[0] not in _DISPLAY_PACKAGES:
             content = read_bytes(path)
             digest.update(f"{relative.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
@@ -130,11 +130,11 @@ class RobotReport:
             "findings": self.summary.findings,
             "chains": self.summary.chains,
             "second_reader": self.summary.second_reader,
-            "checks": [self._check(key) for key in self.error_stats],
+            "checks": [self._make_check_entry(key) for key in self.error_stats],
             "accuracy": study,
         }
 
-    def _check(self, key: Key) -> dict[str, Any]:
+    def _make_check_entry(self, key: Key) -> dict[str, Any]:
         quantity, reference = key
         stats = self.error_stats[key]
         case = stats.case
@@ -217,7 +217,7 @@ class ValidationReport(Displayable):
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
-            f"urdfkin validate {_source_words(origins)} {settings} {origins[0].command_line_options}".rstrip()
+            f"urdfkin validate {_join_sources(origins)} {settings} {origins[0].command_line_options}".rstrip()
             for origins in _group_by_command([robot.origin for robot in self.robots])
         )
 
@@ -276,7 +276,7 @@ def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
     return list(groups.values())
 
 
-def _source_words(origins: Sequence[Origin]) -> str:
+def _join_sources(origins: Sequence[Origin]) -> str:
     if tuple(origin.source for origin in origins) == example_robot_data_names():
         return "--all"
     return shlex.join(origin.source_argument for origin in origins)

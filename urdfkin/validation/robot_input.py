@@ -1,7 +1,7 @@
 """The robots to validate, as plain data; `origin` and the digest of the text identify a robot.
 
 A robot from a file is represented by the path, so that thousands of robots take little memory.
-`RobotInput.text` raises InputError if the file has changed since the start of the validation.
+`RobotInput.read_text` raises InputError if the file has changed since the start of the validation.
 """
 
 from __future__ import annotations
@@ -38,30 +38,32 @@ class RobotInput:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
         sha256: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in errors and warnings, if `source` is the text of the robot.
-        listed: Errors and warnings about the original MJCF or USD file.
-        made: Whether the text was converted to URDF from another format.
+        source_findings: Errors and warnings about the original MJCF or USD file.
     """
 
     source: str | bytes
     origin: Origin
     sha256: str = ""
     file: str = "<bytes>"
-    listed: tuple[Finding, ...] = ()
-    made: bool = False
+    source_findings: tuple[Finding, ...] = ()
 
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
         if robot.source in catalogue():
-            robot_input = _from_word(robot.source, robot.origin.mimic, robot.origin.root_joint)
+            robot_input = _from_path_or_name(robot.source, robot.origin.mimic, robot.origin.root_joint)
             return replace(robot_input, origin=replace(robot_input.origin, lock=robot.origin.lock))
-        listed = tuple(finding for finding in robot.findings if finding.code.startswith(("MJCF", "USD")))
-        return replace(_from_text(robot.urdf.encode(), robot.origin, robot.source), listed=listed)
+        source_findings = tuple(
+            finding for finding in robot.findings if finding.code.startswith(("MJCF", "USD"))
+        )
+        return replace(
+            _from_text(robot.urdf.encode(), robot.origin, robot.source), source_findings=source_findings
+        )
 
     @property
     def label(self) -> str:
         return self.origin.source
 
-    def text(self) -> UrdfText:
+    def read_text(self) -> UrdfText:
         """Return the robot's text; raise InputError if the file's digest is not `sha256`."""
         if isinstance(self.source, bytes):
             return UrdfText(self.source, self.file, self.label, catalogue().get(self.label))
@@ -76,20 +78,19 @@ class RobotInput:
 
     def with_text(self) -> RobotInput:
         """Return a copy that contains the text, for other machines."""
-        text = self.text()
+        text = self.read_text()
         return replace(self, source=text.data, file=text.label)
 
-    def read(self) -> Robot:
+    def make_robot(self) -> Robot:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
             robot = make_robot(
-                self.text(),
+                self.read_text(),
                 mimic=self.origin.mimic,
                 root_joint=self.origin.root_joint,
                 oracle=ORACLES[self.origin.oracle or PINOCCHIO.name].name,
                 lock=dict(self.origin.lock),
-                source_findings=self.listed,
-                is_generated=self.made,
+                source_findings=self.source_findings,
             )
         robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
         return robot
@@ -100,7 +101,7 @@ class RobotInput:
         Raises:
             OracleError: Pinocchio refuses or misreads the file.
         """
-        robot = self.read()
+        robot = self.make_robot()
         if robot.verifier.known_refusal is not None:
             raise OracleError(robot.verifier.known_refusal, where=self.label)
         return robot
@@ -139,7 +140,7 @@ def make_robot_input(
     robot_input = _make_robot_input(robot, mimic, root_joint, xacro_args)
     if isinstance(lock, str | Mapping) and not lock and joints is None:
         return robot_input
-    return replace(robot_input, origin=robot_input.read().with_locked_joints(lock, joints).origin)
+    return replace(robot_input, origin=robot_input.make_robot().with_locked_joints(lock, joints).origin)
 
 
 def _make_robot_input(
@@ -148,7 +149,7 @@ def _make_robot_input(
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
-            return replace(RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint)), made=True)
+            return RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint))
     if isinstance(robot, Robot):
         return RobotInput.of(robot)
     if is_xacro(robot):
@@ -156,14 +157,14 @@ def _make_robot_input(
         return _from_text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
     source = unambiguous_path(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
-        return _from_word(source, mimic, root_joint)
+        return _from_path_or_name(source, mimic, root_joint)
     text = read_source(source)  # An open file, or standard input, can be read only once.
     if is_mjcf(text.data):
         return _make_robot_input(text.data, mimic, root_joint, None)
     return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 
-def _from_word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:
+def _from_path_or_name(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:
     try:
         text = read_source(source)
     except UrdfkinError:

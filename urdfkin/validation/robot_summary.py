@@ -41,7 +41,7 @@ def describe(robot: Robot) -> ReportedModel:
     (6, True)
     """
     tree = robot.tree
-    narrowed = {one.joint: one for one in range_reductions(tree)}
+    reductions = {one.joint: one for one in range_reductions(tree)}
     data = {
         "name": robot.name,
         "source": robot.source,
@@ -57,12 +57,12 @@ def describe(robot: Robot) -> ReportedModel:
         "rates": robot.velocity_names,
         "frames": robot.frame_names,
         "links": robot.link_names,
-        "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
+        "joints": [_describe_joint(robot, i, reductions) for i in range(len(tree.joints))],
     }
     return cast("ReportedModel", as_json_data(data))
 
 
-def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[str, Any]:
+def _describe_joint(robot: Robot, i: int, reductions: dict[str, RangeReduction]) -> dict[str, Any]:
     tree = robot.tree
     joint = tree.joints[i]
     return {
@@ -76,45 +76,45 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[st
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": joint.limit,
         "mimic": joint.mimic,
-        "remaining_range": _remaining_range(narrowed.get(joint.name)),
+        "remaining_range": _remaining_range(reductions.get(joint.name)),
         **({} if joint.lock is None else {"locked": joint.lock.value}),
     }
 
 
-def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
+def _remaining_range(reduction: RangeReduction | None) -> dict[str, Any] | None:
     """Return the range of a mimicked joint within the limits of its mimic joints.
 
-    None means the joint's whole range.
+    None: the joint's whole range. The ends are None if the limits allow at most one value.
     """
-    if narrowed is None:
+    if reduction is None:
         return None
-    lower, upper = narrowed.allowed_range or (None, None)
-    return {"lower": lower, "upper": upper, "by": narrowed.mimic_joints}
+    lower, upper = reduction.allowed_range or (None, None)
+    return {"lower": lower, "upper": upper, "by": reduction.mimic_joints}
 
 
 #: Maximum number of chains in a summary.
-MOST = 12
+MAX_CHAINS = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")
 
 
-def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
+def make_chains(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
     """Return the chains and their DH tables, as plain data.
 
     Without an oracle, the tables are not checked.
     """
     found = []
-    for limb, base, tip in _chains(robot):
+    for limb, base, tip in _find_chains(robot):
         try:
             tables = {name: make_dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
         except InputError:
             continue  # Denavit-Hartenberg tables contain no planar or floating joints.
         if any(table.rows for table in tables.values()):
-            found.append({"limb": limb, "base": base, "tip": tip} | _with_check(robot, oracle, tables))
+            found.append({"limb": limb, "base": base, "tip": tip} | _describe_tables(robot, oracle, tables))
     return tuple(as_json_data(found))
 
 
-def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
+def _find_chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
     entry = catalogue().get(robot.source)
     if entry is not None and entry.limbs:
         yield from ((limb, base, tip) for limb, (base, tip) in entry.limbs.items())
@@ -122,12 +122,12 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
     tree, seen = robot.tree, set[tuple[int, ...]]()
     for leaf in sorted(tree.leaves(), key=lambda leaf: tree.links[leaf] != robot.tip_frame):
         moving = tuple(i for i in tree.path(leaf) if tree.joints[i].kind.nv)
-        if moving and moving not in seen and len(seen) < MOST:
+        if moving and moving not in seen and len(seen) < MAX_CHAINS:
             seen.add(moving)
             yield None, robot.base_frame, tree.link_frames[leaf]
 
 
-def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
+def _describe_tables(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
     data: dict[str, Any] = {
         name: {
             "rows": [
@@ -140,13 +140,13 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
     }
     if oracle is None:
         return data | {"samples": 0, "metres": None, "worst": None, "bound_ratio": None}
-    drawn = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
-    checks = [check_table(oracle, robot.tree, table, drawn) for table in tables.values()]
+    samples = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
+    checks = [check_table(oracle, robot.tree, table, samples) for table in tables.values()]
     return data | {
         "samples": checks[0].samples,
         "metres": max(check.metres for check in checks),
         "worst": max(units for check in checks for units in check.units.values()),
-        "bound_ratio": max(share for check in checks for share in check.bound_ratios.values()),
+        "bound_ratio": max(ratio for check in checks for ratio in check.bound_ratios.values()),
     }
 
 
@@ -161,9 +161,11 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = as_json_data(compare_with_yourdfpy(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
-        return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
+        mimic, has_root_joint = robot.verifier.mimic, robot.root_joint is not None
+        reading = as_json_data(
+            compare_with_yourdfpy(robot.urdf, robot.tree, mimic=mimic, root_joint=has_root_joint)
+        )
+        return cls(describe(robot), make_finding_entries(robot.findings), make_chains(robot, oracle), reading)
 
     @property
     def disagreements(self) -> tuple[str, ...]:
@@ -174,10 +176,10 @@ class RobotSummary:
 
 
 def chain_disagreement(chain: Chain) -> str | None:
-    share = chain["bound_ratio"]
-    if not chain["samples"] or (share is not None and share <= 1.0):
+    bound_ratio = chain["bound_ratio"]
+    if not chain["samples"] or (bound_ratio is not None and bound_ratio <= 1.0):
         return None
-    how = "by an infinite amount" if share is None else f"{share:.3g} times the bound"
+    how = "by an infinite amount" if bound_ratio is None else f"{bound_ratio:.3g} times the bound"
     off = "" if chain["metres"] is None else f", tip {chain['metres']:.2g} m off"
     return (
         f"the Denavit-Hartenberg tables from {chain['base']} to {chain['tip']} disagree with"
@@ -194,5 +196,5 @@ def reader_disagreement(reading: ReportedSecondReading) -> str | None:
 EMPTY_SUMMARY = RobotSummary()
 
 
-def entries_of(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:
+def make_finding_entries(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:
     return tuple(cast("FindingEntry", finding.as_dict()) for finding in findings)

@@ -5,7 +5,10 @@
     DIR/chunks/4f/4f1a....failed   reason why the robot of a chunk could not be checked
     DIR/accuracy.json              settings of the accuracy study
     DIR/chunks/4f/4f1a....accuracy result of the accuracy study of a robot
-    DIR/lock                       locked by the process that writes to the store
+    DIR/lock                       locked by each process that writes to the store
+    DIR/lock-2-of-4                locked by the process that computes shard 2/4
+    DIR/.writing/                  unfinished files
+    DIR/damaged/                   damaged and unknown files
 
 The manifest defines the robots, the samples, the versions, the chunks and the key of each chunk. The key is
 the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts or options
@@ -60,15 +63,15 @@ if TYPE_CHECKING:
 _LAYOUT = "urdfkin-campaign/1"
 _MAX_DIFFERENCES = 4
 _MANIFEST, _LOCK, _CHUNKS, _DAMAGED = "manifest.json", "lock", "chunks", "damaged"
-_SCRATCH = ".writing"
+_SCRATCH_FOLDER = ".writing"
 #: File with the settings of the accuracy study.
-_STUDY_FILE = "accuracy.json"
+_STUDY_SETTINGS_FILE = "accuracy.json"
 #: Suffix of files with accuracy results.
 _STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: Number of attempts to acquire a lock, 0.1 s apart.
-_TRIES = 10
+_LOCK_ATTEMPTS = 10
 
 _T = TypeVar("_T")
 
@@ -106,10 +109,12 @@ class Manifest:
         return [RobotInput(origin.source, origin, sha256) for origin, sha256 in self.robots]
 
     def key(self, robot: int, index: int) -> str:
-        return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.chunking)}".encode()).hexdigest()
+        return hashlib.sha256(
+            f"{self._robot_digests[robot]} {index} of {len(self.chunking)}".encode()
+        ).hexdigest()
 
     @cached_property
-    def _keys(self) -> list[str]:
+    def _robot_digests(self) -> list[str]:
         settings = json.dumps([_LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -130,7 +135,7 @@ class Manifest:
             for m in (self, other)
         )
         lines = [
-            f"{name} {_short(own.get(name))} and {_short(theirs.get(name))}"
+            f"{name} {_shorten_digest(own.get(name))} and {_shorten_digest(theirs.get(name))}"
             for name in own | theirs
             if own.get(name) != theirs.get(name)
         ]
@@ -146,7 +151,7 @@ class Manifest:
         )
 
 
-def _short(value: object) -> str:
+def _shorten_digest(value: object) -> str:
     text = str(value)
     return text[:12] if len(text) == 64 else text
 
@@ -198,7 +203,7 @@ class Store:
             return None
 
     def write_answer(self, robot: int, index: int, answer: Answer) -> None:
-        """Write an answer; on return, the complete file is on disk."""
+        """Write an answer; the file's content is flushed to the disk before the file gets its name."""
         key = self.manifest.key(robot, index)
         self.write_entry(key, _FAILED if isinstance(answer, Failure) else _DONE, encode_answer(key, answer))
 
@@ -206,14 +211,18 @@ class Store:
         return self._path_of(key, kind).exists()
 
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
-        self._write(self._path_of(key, kind), data)
+        self._write_atomically(self._path_of(key, kind), data)
 
     def delete_failures(self) -> None:
-        for path in self._files(_FAILED):
+        for path in self._find_files(_FAILED):
             path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files with unknown names; a writable store moves them to `damaged/`."""
+        """Report files with unknown names; a writable store moves them to `damaged/`.
+
+        Results of the accuracy study are not reported: their names depend on settings that the manifest does
+        not contain.
+        """
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -230,7 +239,7 @@ class Store:
         Returns:
             {robot: (number of chunks with a result, whether a chunk failed)}.
         """
-        names = {path.name for kind in (_DONE, _FAILED) for path in self._files(kind)}
+        names = {path.name for kind in (_DONE, _FAILED) for path in self._find_files(kind)}
         counts = {}
         for robot in range(len(self.manifest.robots)):
             keys = [self.manifest.key(robot, index) for index in range(len(self.manifest.chunking))]
@@ -274,7 +283,7 @@ class Store:
         """
         for path in (self.folder / _LOCK, *sorted(self.folder.glob(f"{_LOCK}-*"))):
             try:
-                with _lock_file(path, os.O_RDONLY) as file:
+                with _open_lock_file(path, os.O_RDONLY) as file:
                     if not _try_lock(file, fcntl.LOCK_SH):
                         return _read_holder(file)
             except OSError:
@@ -282,12 +291,12 @@ class Store:
         return None
 
     def write(self, name: str, data: bytes) -> None:
-        self._write(self.folder / name, data)
+        self._write_atomically(self.folder / name, data)
 
     def _path_of(self, key: str, kind: str) -> Path:
         return self.folder / _CHUNKS / key[:2] / (key + kind)
 
-    def _files(self, kind: str) -> Iterator[Path]:
+    def _find_files(self, kind: str) -> Iterator[Path]:
         return (self.folder / _CHUNKS).glob(f"*/*{kind}")
 
     def _quarantine(self, path: Path, why: str) -> None:
@@ -298,7 +307,7 @@ class Store:
                 damaged.mkdir(exist_ok=True)
                 path.replace(damaged / path.name)
 
-    def _write(self, path: Path, data: bytes) -> None:
+    def _write_atomically(self, path: Path, data: bytes) -> None:
         if self.scratch is None:
             raise SourceError("the store is read-only", where=str(self.folder))
         unfinished = self.scratch / path.name
@@ -314,11 +323,11 @@ class Store:
                 "the store cannot be written",
                 where=str(self.folder),
                 found=error.strerror or str(error),
-                remedy=f"{_remedy(error)}, and repeat the same command; finished chunks are kept",
+                remedy=f"{_make_remedy(error)}, and repeat the same command; finished chunks are kept",
             ) from error
 
 
-def _remedy(error: OSError) -> str:
+def _make_remedy(error: OSError) -> str:
     is_full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     return "free some disk space" if is_full else "correct the folder or its permissions"
 
@@ -338,20 +347,20 @@ def open_store(
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not (folder / _MANIFEST).exists() and not all(map(_is_ours, folder.iterdir())):
+        if not (folder / _MANIFEST).exists() and not all(map(_is_store_entry, folder.iterdir())):
             raise InputError(
                 "the folder is not empty and is not a store",
                 where=str(folder),
                 remedy="give an empty or a new folder",
             )
         with _hold_lock(folder, shard):
-            if (folder / _SCRATCH).is_symlink():
+            if (folder / _SCRATCH_FOLDER).is_symlink():
                 raise SourceError(
                     "a symbolic link replaces a folder of the store",
-                    where=str(folder / _SCRATCH),
+                    where=str(folder / _SCRATCH_FOLDER),
                     remedy="delete the link",
                 )
-            scratch = folder / _SCRATCH / (shard or "all").replace("/", "-of-")
+            scratch = folder / _SCRATCH_FOLDER / (shard or "all").replace("/", "-of-")
             shutil.rmtree(scratch, ignore_errors=True)  # A killed process leaves unfinished files.
             scratch.mkdir(parents=True)
             try:
@@ -370,16 +379,13 @@ def open_store(
         ) from error
 
 
-def _is_ours(path: Path) -> bool:
-    """Return whether a path has the name of a lock or folder of a store.
-
-    A new store gets its lock before its manifest.
-    """
-    return path.name in (_SCRATCH, _CHUNKS) or path.name.startswith(_LOCK)
+def _is_store_entry(path: Path) -> bool:
+    """A new store gets its lock before its manifest, so a store without a manifest has only such names."""
+    return path.name in (_SCRATCH_FOLDER, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Return the store with its manifest.
+    """Decide which manifest the store has.
 
     | case | result |
     |---|---|
@@ -415,19 +421,19 @@ def _only_failed_robots_differ(store: Store, manifest: Manifest) -> bool:
 @contextlib.contextmanager
 def _hold_lock(folder: Path, shard: str | None) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
-        file = stack.enter_context(_lock_file(folder / _LOCK))
-        _lock(file, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
+        file = stack.enter_context(_open_lock_file(folder / _LOCK))
+        _acquire_lock(file, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
         if shard:
-            file = stack.enter_context(_lock_file(folder / f"{_LOCK}-{shard.replace('/', '-of-')}"))
-            _lock(file, fcntl.LOCK_EX, folder)
+            file = stack.enter_context(_open_lock_file(folder / f"{_LOCK}-{shard.replace('/', '-of-')}"))
+            _acquire_lock(file, fcntl.LOCK_EX, folder)
         file.truncate(0)
         file.write(json.dumps({"host": socket.gethostname(), "process": os.getpid()}).encode())
         file.flush()
         yield
 
 
-def _lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """Open the file of a lock; refuse links, pipes and devices."""
+def _open_lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
+    """Refuse links, pipes and devices."""
     message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -441,8 +447,8 @@ def _lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) ->
     return os.fdopen(descriptor, "rb" if flags == os.O_RDONLY else "a+b")
 
 
-def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
-    for _ in range(_TRIES):
+def _acquire_lock(file: IO[bytes], flags: int, folder: Path) -> None:
+    for _ in range(_LOCK_ATTEMPTS):
         if _try_lock(file, flags):
             return
         time.sleep(0.1)  # `Store.writing_process` in another process may hold the lock for a moment.
@@ -481,7 +487,10 @@ class FailedStudy:
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study; `moving_base` gives each root link a random motion."""
+    """Settings of the accuracy study.
+
+    With `moving_base`, the root link has a random motion in each sample; otherwise, it is fixed.
+    """
 
     samples: int
     seed: int
@@ -515,22 +524,22 @@ class AccuracyStore:
     def from_store(cls, store: Store) -> AccuracyStore | None:
         """Return the store's accuracy results; None if they are missing or unreadable."""
         try:
-            if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
+            if (content := read_if_exists(store.folder / _STUDY_SETTINGS_FILE)) is None:
                 return None
             settings = from_data(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
             store.notify(
-                f"{store.folder / _STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
-                " accuracy results"
+                f"{store.folder / _STUDY_SETTINGS_FILE} cannot be read ({type(error).__name__}): the report"
+                " has no accuracy results"
             )
             return None
         return cls(store, settings)
 
     def write_settings(self) -> None:
-        self._store.write(_STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
+        self._store.write(_STUDY_SETTINGS_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
     def read(self, robot: int) -> AccuracyStudy | FailedStudy | None:
-        return self._store.read_entry(self._key(robot), _STUDY_SUFFIX, _decode)
+        return self._store.read_entry(self._key(robot), _STUDY_SUFFIX, _decode_study)
 
     def has(self, robot: int) -> bool:
         return self._store.has_entry(self._key(robot), _STUDY_SUFFIX)
@@ -559,7 +568,7 @@ class AccuracyStore:
         return hashlib.sha256(json.dumps([_LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
 
 
-def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
+def _decode_study(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
     from urdfkin.validation.accuracy import AccuracyStudy
 
     data = unpack(key, content).get("accuracy")

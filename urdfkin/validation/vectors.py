@@ -64,16 +64,16 @@ LICENCE = "CC0-1.0"
 #: Number of configurations of each robot. The first configuration is the zero configuration.
 #: If the limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
-#: Random joint velocities and joint accelerations are between -_RANGE and _RANGE.
-#: Random q of planar and floating joints, except quaternions, are also between -_RANGE and _RANGE.
-_RANGE = 2.0
-#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
+#: Random joint velocities and joint accelerations are between -_MAX_RANDOM and _MAX_RANDOM.
+#: Random q of planar and floating joints, except quaternions, are also between -_MAX_RANDOM and _MAX_RANDOM.
+_MAX_RANDOM = 2.0
+#: Inputs are rounded to multiples of 1 / _STEPS_PER_UNIT, except quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
-_GRID = 1024.0
+_STEPS_PER_UNIT = 1024.0
 #: The tolerance k * eps * scale is rounded twice: to the nearest number with 12 significant digits,
 #: and then upward to a number with 3 significant digits.
 #: The rounding to 12 digits removes the last digits, which differ between processors.
-_DIGITS, _FIRST_DIGITS = 3, 12
+_TOLERANCE_DIGITS, _FIRST_TOLERANCE_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
     ACCELERATION,
@@ -193,30 +193,28 @@ def file_stem(name: str) -> str:
 
 
 @cache
-def features() -> Mapping[str, Feature]:
+def load_features() -> Mapping[str, Feature]:
     """Return the features in `robots/features.toml` by name.
 
-    >>> features()["axis of length 2"].rule
+    >>> load_features()["axis of length 2"].rule
     'The axis is a direction: its length has no effect on an angle.'
     """
     data = tomllib.loads(read_text(robots_dir() / "features.toml"))
-    return {row["name"]: _feature(row, data["parts"]) for row in data["feature"]}
+    return {row["name"]: _make_feature(row, data["parts"]) for row in data["feature"]}
 
 
-def _feature(row: Mapping[str, Any], parts: Mapping[str, str]) -> Feature:
-    written = row.get("file") or _robot(row)
+def _make_feature(row: Mapping[str, Any], parts: Mapping[str, str]) -> Feature:
+    text = row.get("file") or _make_urdf(row)
     for name, part in (*parts.items(), ("inertial", _INERTIAL)):
-        written = written.replace(f"{{{name}}}", part)
-    data = (row.get("head", "") + written).encode(row.get("encoding", "utf-8"))
-    return Feature(
-        row["name"], row["rule"], row.get("note"), written, data, tuple(row.get("frames", ("tip",)))
-    )
+        text = text.replace(f"{{{name}}}", part)
+    data = (row.get("head", "") + text).encode(row.get("encoding", "utf-8"))
+    return Feature(row["name"], row["rule"], row.get("note"), text, data, tuple(row.get("frames", ("tip",))))
 
 
 _INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
 
 
-def _robot(row: Mapping[str, Any]) -> str:
+def _make_urdf(row: Mapping[str, Any]) -> str:
     joints = row.get("joints")
     if joints is None:
         joints = (
@@ -234,36 +232,43 @@ def _robot(row: Mapping[str, Any]) -> str:
 # -- configurations -------------------------------------------------------------------------------------
 
 
-def _fraction(*words: object) -> float:
+def _hash_to_fraction(*words: object) -> float:
     """Return a number in [0, 1) from the SHA-256 digest of `words`."""
     digest = hashlib.sha256("\n".join(map(str, words)).encode()).digest()
     return int.from_bytes(digest[:6], "big") / 2.0**48
 
 
-def _on_grid(x: float) -> float:
-    return round(x * _GRID) / _GRID
+def _round_to_grid(x: float) -> float:
+    return round(x * _STEPS_PER_UNIT) / _STEPS_PER_UNIT
 
 
-def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def make_configuration(
+    tree: KinematicTree, name: str, sample: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q, v and a of a sample.
 
     The numbers depend only on the sample's index, and on the robot's name, joints and limits.
     """
     q, ranges = neutral(tree), coordinate_ranges(tree)
-    for joint, at in zip(tree.joints, tree.q_index, strict=True):
-        unit = [_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
+    for joint, start in zip(tree.joints, tree.q_index, strict=True):
+        fractions = [_hash_to_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
         if joint.nq == 1:
             lower, upper = ranges[joint.name]
-            wanted = _on_grid(lower + (upper - lower) * unit[0]) if sample else 0.0
-            q[at] = min(max(wanted, lower), upper)
+            value = _round_to_grid(lower + (upper - lower) * fractions[0]) if sample else 0.0
+            q[start] = min(max(value, lower), upper)
         elif joint.kind is JointKind.FLOATING and sample:
-            quaternion = [2.0 * x - 1.0 for x in unit[3:]]
+            quaternion = [2.0 * x - 1.0 for x in fractions[3:]]
             length = math.sqrt(math.fsum(x * x for x in quaternion))
-            q[at + 3 : at + 7] = [x / length for x in quaternion]
+            q[start + 3 : start + 7] = [x / length for x in quaternion]
         if joint.nq > 1 and sample:
-            q[at : at + 3] = [_on_grid(_RANGE * (2.0 * x - 1.0)) for x in unit[:3]]
+            q[start : start + 3] = [_round_to_grid(_MAX_RANDOM * (2.0 * x - 1.0)) for x in fractions[:3]]
     v, a = (
-        np.array([_on_grid(_RANGE * (2.0 * _fraction(name, sample, of, k) - 1.0)) for k in range(tree.nv)])
+        np.array(
+            [
+                _round_to_grid(_MAX_RANDOM * (2.0 * _hash_to_fraction(name, sample, of, k) - 1.0))
+                for k in range(tree.nv)
+            ]
+        )
         for of in "va"
     )
     return q, v, a
@@ -272,13 +277,13 @@ def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArr
 # -- tolerances -----------------------------------------------------------------------------------------
 
 
-def _tolerance(k: float, scale: float) -> str:
-    """Return k * eps * scale as a decimal, rounded up."""
+def _format_tolerance(k: float, scale: float) -> str:
+    """Return k * max(eps * scale, smallest subnormal number) as a decimal; "0" if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_FIRST_DIGITS):
+    with localcontext(prec=_FIRST_TOLERANCE_DIGITS):
         number = +Decimal(k * max(EPS * scale, SMALLEST_SUBNORMAL))
-    with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
+    with localcontext(prec=_TOLERANCE_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())
 
 
@@ -309,16 +314,16 @@ class _Header:
 
 
 def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles]:
-    for feature in features().values():
+    for feature in load_features().values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             robot = load(feature.text, verify=False)
-        place = folder / file_stem(feature.name)
-        file = place.with_name(f"{place.name}.urdf")
+        stem_path = folder / file_stem(feature.name)
+        file = stem_path.with_name(f"{stem_path.name}.urdf")
         write_file(file, feature.data)
         sha256 = hashlib.sha256(feature.data).hexdigest()
-        head = _Header(feature.name, file.name, sha256, feature.rule, feature.note)
-        found = _write(place, robot, head, feature.frames, samples)
+        header = _Header(feature.name, file.name, sha256, feature.rule, feature.note)
+        found = _write_vectors(stem_path, robot, header, feature.frames, samples)
         yield replace(found, files=(*found.files, file))
 
 
@@ -330,12 +335,12 @@ def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFil
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
         sha256 = hashlib.sha256(read_bytes(entry.path)).hexdigest()
-        head = _Header(name, entry.relative_path.as_posix(), sha256, note=entry.mimic_problem)
-        return _write(folder / file_stem(name), robot, head, frames, samples)
+        header = _Header(name, entry.relative_path.as_posix(), sha256, note=entry.mimic_problem)
+        return _write_vectors(folder / file_stem(name), robot, header, frames, samples)
     data, file = robot.urdf.encode(), f"{file_stem(name)}.urdf"
     write_file(folder / file, data)
-    head = _Header(name, file, hashlib.sha256(data).hexdigest(), license=None)
-    found = _write(folder / file_stem(name), robot, head, frames, samples)
+    header = _Header(name, file, hashlib.sha256(data).hexdigest(), license=None)
+    found = _write_vectors(folder / file_stem(name), robot, header, frames, samples)
     return replace(found, files=(*found.files, folder / file))
 
 
@@ -362,12 +367,14 @@ def write_sums(folder: Path, written: Sequence[VectorFiles]) -> Path:
     return folder / "SHA256SUMS"
 
 
-def _write(place: Path, robot: Robot, head: _Header, frames: Sequence[str], samples: int) -> VectorFiles:
+def _write_vectors(
+    stem_path: Path, robot: Robot, header: _Header, frames: Sequence[str], samples: int
+) -> VectorFiles:
     tree = robot.tree
-    found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
+    found = [_compute_sample(robot, header.robot, frames, sample) for sample in range(samples)]
     rows = [
-        f"# {VECTORS.name} version {VERSION}, {head.license or 'no licence'}: {log_line(head.robot)}",
-        f"# file {log_line(head.file)}, sha256 {head.sha256}",
+        f"# {VECTORS.name} version {VERSION}, {header.license or 'no licence'}: {log_line(header.robot)}",
+        f"# file {log_line(header.file)}, sha256 {header.sha256}",
         "# sample, frame, reference, quantity, values, tolerances",
     ]
     parts = []
@@ -379,66 +386,65 @@ def _write(place: Path, robot: Robot, head: _Header, frames: Sequence[str], samp
             for one in results
         ]
         lists = ",\n".join(f'   "{name}": [{", ".join(x)}]' for name, x in inputs.items())
-        texts = ",\n".join(f"    {_result(one)}" for one in results)
+        texts = ",\n".join(f"    {_format_result(one)}" for one in results)
         parts.append(f'  {{\n{lists},\n   "results": [\n{texts}\n   ]\n  }}')
     joints = [
         {"name": joint.name, "type": joint.kind.value, "q": [i, i + joint.nq], "v": [j, j + joint.nv]}
         for joint, i, j in zip(tree.joints, tree.q_index, tree.v_index, strict=True)
         if joint.nq
     ]
-    entries = {"schema": VECTORS.name, "version": VERSION, "license": head.license, "robot": head.robot}
-    entries |= {"file": head.file, "sha256": head.sha256, "rule": head.rule, "note": head.note}
+    entries = {"schema": VECTORS.name, "version": VERSION, "license": header.license, "robot": header.robot}
+    entries |= {"file": header.file, "sha256": header.sha256, "rule": header.rule, "note": header.note}
     top = "".join(
         f" {json_text(name)}: {json_text(entry)},\n" for name, entry in {**entries, "joints": joints}.items()
     )
     body = ",\n".join(parts)
-    files = place.with_name(f"{place.name}.json"), place.with_name(f"{place.name}.tsv")
+    files = stem_path.with_name(f"{stem_path.name}.json"), stem_path.with_name(f"{stem_path.name}.tsv")
     write_file(files[0], f'{{\n{top} "samples": [\n{body}\n ]\n}}\n'.encode())
     write_file(files[1], "".join(f"{row}\n" for row in rows).encode())
-    return VectorFiles(head.robot, files, sum(len(one["value"]) for _, results in found for one in results))
+    return VectorFiles(header.robot, files, sum(len(one["value"]) for _, results in found for one in results))
 
 
-def _result(one: Mapping[str, Any]) -> str:
-    """Return a result as JSON."""
-    texts = {name: json_text(x) for name, x in one.items()}
-    texts |= {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
+def _format_result(result: Mapping[str, Any]) -> str:
+    """Return a result as JSON; `value` and `tolerance` are texts, which become numbers without rounding."""
+    texts = {name: json_text(x) for name, x in result.items()}
+    texts |= {name: f"[{', '.join(result[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
 
 
-def _sample(
+def _compute_sample(
     robot: Robot, name: str, frames: Sequence[str], sample: int
 ) -> tuple[dict[str, list[str]], list[dict[str, Any]]]:
-    q, v, a = configuration(robot.tree, name, sample)
+    q, v, a = make_configuration(robot.tree, name, sample)
     inputs = {name: [repr(float(x)) for x in array] for name, array in zip("qva", (q, v, a), strict=True)}
     digits = max(DIGITS, enough_digits(len(robot.tree.joints)))
     while True:
-        results = list(_results(robot, frames, (q, v, a), digits))
+        results = list(_compute_results(robot, frames, (q, v, a), digits))
         if all(None not in one["value"] for one in results):
             return inputs, results
         digits *= 2
 
 
-def _results(
+def _compute_results(
     robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of a sample.
-
-    Results are intervals with `digits` digits. If an interval is too wide for 17 digits, the value is None.
-    """
+    """Compute intervals with `digits` digits; the value of an interval too wide for 17 digits is None."""
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:
         link = tree.frame_link(frame)
         plan, path = robot.plan((link,)), tree.path(link)
-        rows = q[np.newaxis], v[np.newaxis], a[np.newaxis]
-        size = true_value_magnitudes(plan, *rows, conversion_errors(robot.urdf, tree, path, rows[0]))
+        batch = q[np.newaxis], v[np.newaxis], a[np.newaxis]
+        magnitudes = true_value_magnitudes(plan, *batch, conversion_errors(robot.urdf, tree, path, batch[0]))
         with precision(digits):
             motion = compute_motion(tree, read_exact_joints(robot.urdf, tree, path), q, v, a)
             for row in QUANTITIES:
                 for reference in row.references:
-                    yield _entry(row, motion, link, reference, frame, row.bound(plan, size, reference))
+                    yield _make_result_entry(
+                        row, motion, link, reference, frame, row.bound(plan, magnitudes, reference)
+                    )
 
 
-def _entry(
+def _make_result_entry(
     row: Quantity, motion: Any, link: int, reference: Reference | None, frame: str, bound: Any
 ) -> dict[str, Any]:
     values = row.enclose(motion, link, reference)
@@ -453,5 +459,5 @@ def _entry(
         "value": [
             format_decimal(x, k * EPS * s) for x, s in zip(values.reshape(-1).tolist(), scale, strict=True)
         ],
-        "tolerance": [_tolerance(k, s) for s in scale],
+        "tolerance": [_format_tolerance(k, s) for s in scale],
     }

@@ -1,8 +1,8 @@
 """Engine that runs chunks in processes of this machine.
 
 The crash of a process affects only the robot that this process validates. A worker process is a new Python
-interpreter. A worker imports neither the parent's main module nor modules of the current folder, so a script
-needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot.
+interpreter. A worker does not import the parent's main module, so a script needs no `__main__` guard. A
+worker has one chunk at a time, so each crash can be attributed to a robot.
 
 If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
 separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
@@ -37,9 +37,9 @@ from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, WorkQueue
 
 #: Module with the function `serve`, which each worker process runs.
-WORKER = "urdfkin.validation.worker_processes"
+WORKER_MODULE = "urdfkin.validation.worker_processes"
 #: Maximum time to wait for the exit status of a crashed worker, s.
-_GRACE = 5.0
+_EXIT_TIMEOUT = 5.0
 
 
 class WorkerProcess:
@@ -66,23 +66,19 @@ class WorkerProcess:
 
     def wait_for_cause(self) -> str:
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(_GRACE)
+            self._process.wait(_EXIT_TIMEOUT)
         self.end()
         return _signal_or_status(self._process.returncode)
 
 
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """Start a Python interpreter with the same packages.
-
-    The interpreter has its own process group. Therefore, Ctrl-C interrupts only the parent, which saves the
-    finished results.
-    """
-    command = python_command(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
+    """The process has its own group, so Ctrl-C interrupts only the parent, which saves finished results."""
+    command = python_command(f"from {WORKER_MODULE} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 
 
 def _signal_or_status(status: int) -> str:
-    """Return an exit status as text: the name of a signal, or the status as a number.
+    """Describe a return code of `Popen`: a negative code is the number of a signal.
 
     >>> _signal_or_status(-11), _signal_or_status(3)
     ('signal SIGSEGV', 'exit status 3')
@@ -114,7 +110,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Receive chunks, and end this process when the parent ends."""
+    """The pipe closes when the parent ends; then end this process."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -123,10 +119,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent process ends.
-
-    On Linux, the process ends even while compiled code hangs.
-    """
+    """On Linux, this process ends with its parent even while compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -151,31 +144,33 @@ class ProcessEngine:
         process.
         """
         if self._isolate:
-            _WorkerPool(work, self._jobs, on_answer, alone=CRASHED).work()
+            _WorkerPool(work, self._jobs, on_answer, crash_reason=CRASHED).run()
             return
         pool = _WorkerPool(work, self._jobs, on_answer)
-        pool.work()
+        pool.run()
         to_retry = [sorted(tasks, key=lambda task: task.chunk.index) for tasks in pool.to_retry.values()]
-        _WorkerPool(to_retry, 1, on_answer, alone=CRASHED_TWICE).work()
+        _WorkerPool(to_retry, 1, on_answer, crash_reason=CRASHED_TWICE).run()
 
 
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
     Args:
-        alone: None if a process validates several robots. Otherwise, each process validates one robot. If
-            the process crashes, `alone` is the reason in the robot's report.
+        crash_reason: Reason in the report of a robot that crashed its process; each process then validates
+            one robot. None: a process can validate several robots.
     """
 
-    def __init__(self, work: Work, jobs: int, on_answer: AnswerCallback, *, alone: str | None = None) -> None:
-        self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
-        self._queue = WorkQueue(work, shared=alone is None)
-        self._workers: list[_BusyWorker] = []
+    def __init__(
+        self, work: Work, jobs: int, on_answer: AnswerCallback, *, crash_reason: str | None = None
+    ) -> None:
+        self._jobs, self._on_answer, self._crash_reason = jobs, on_answer, crash_reason
+        self._queue = WorkQueue(work, shared=crash_reason is None)
+        self._workers: list[_PoolWorker] = []
         #: The unfinished tasks of each robot that crashed a process.
         #: These tasks run after the tasks of all other robots.
         self.to_retry: dict[int, list[Task]] = {}
 
-    def work(self) -> None:
+    def run(self) -> None:
         """Run until no task is left; the worker processes always end."""
         try:
             while True:
@@ -199,25 +194,25 @@ class _WorkerPool:
             task, tasks = found
             try:
                 if worker is None:
-                    worker = _BusyWorker()
+                    worker = _PoolWorker()
                     self._workers.append(worker)
             except Exception as error:
                 if self._workers:
                     # No new process can be started, so an existing worker process takes the task later.
                     self._queue.put_back(task, tasks)
                     return
-                self._enter_answer(task, make_lost_failure("no process could be started", error))
+                self._record_answer(task, make_lost_failure("no process could be started", error))
                 continue
             self._send(worker, task, tasks)
 
-    def _send(self, worker: _BusyWorker, task: Task, tasks: RobotTasks) -> None:
+    def _send(self, worker: _PoolWorker, task: Task, tasks: RobotTasks) -> None:
         worker.task, worker.tasks = task, tasks
         try:
             worker.connection.send(task.chunk)
         except OSError:
             self._handle_crash(worker, task)
 
-    def _receive(self, worker: _BusyWorker, task: Task) -> None:
+    def _receive(self, worker: _PoolWorker, task: Task) -> None:
         try:
             answer: Answer = worker.connection.recv()
         except (EOFError, OSError):
@@ -225,30 +220,30 @@ class _WorkerPool:
             return
         except Exception as error:
             answer = make_lost_failure("the answer of the worker process cannot be read", error)
-        self._enter_answer(task, answer)
+        self._record_answer(task, answer)
         worker.task = None
         if (next_task := self._queue.next(worker.tasks)) is not None:
             self._send(worker, next_task, worker.tasks)
-        elif self._alone:
+        elif self._crash_reason:
             self._workers.remove(worker)
             worker.end()
 
-    def _enter_answer(self, task: Task, answer: Answer) -> None:
+    def _record_answer(self, task: Task, answer: Answer) -> None:
         if isinstance(answer, Failure):
             self._queue.remove(task.robot)
             self.to_retry.pop(task.robot, None)
         self._on_answer(task, answer)
 
-    def _handle_crash(self, worker: _BusyWorker, task: Task) -> None:
+    def _handle_crash(self, worker: _PoolWorker, task: Task) -> None:
         self._workers.remove(worker)
         cause = worker.wait_for_cause()
-        if self._alone is None:
+        if self._crash_reason is None:
             self.to_retry.setdefault(task.robot, []).extend([task, *self._queue.withdraw(task.robot)])
         else:
-            self._enter_answer(task, make_crash_failure(task.chunk.robot_input, self._alone, cause))
+            self._record_answer(task, make_crash_failure(task.chunk.robot_input, self._crash_reason, cause))
 
 
-class _BusyWorker(WorkerProcess):
+class _PoolWorker(WorkerProcess):
     def __init__(self) -> None:
         super().__init__()
         self.task: Task | None = None
