@@ -244,6 +244,14 @@ def test_the_table_of_a_urdf_agrees_exactly_even_with_nearly_coincident_axes(
     assert found.differences == ()
 
 
+@pytest.mark.parametrize("seed", [2, 5, 9, 16, 17, *long(range(20, 40))])
+def test_a_strict_table_agrees_although_an_offset_of_a_prismatic_joint_starts_far_away(seed: int) -> None:
+    # Beside a nearly parallel axis, the offset of the URDF's own strict table is hundreds of metres.
+    tree = nearly_coincident(seed)
+    table = make_dh_table(tree, "tip", near_parallel="strict")
+    assert compare(make_chain(tree, "tip"), disguised(table, seed)).is_exact
+
+
 @pytest.mark.parametrize("seed", [0, 3, 8, *long({*range(12)} - {0, 3, 8})])
 def test_a_wrong_cell_beside_nearly_coincident_axes_is_detected(seed: int) -> None:
     square = rotation("x", math.pi / 2)

@@ -66,6 +66,8 @@ _EXACT_FIT_ERROR = 1e-13
 _EXACT_TIP_ERROR = 1e-12
 #: Other joint signs are accepted if: tip error < this number * smallest tip error of earlier joint signs
 _OTHER_SIGNS_ERROR_RATIO = 0.5
+#: A fit starts with fitted translations only if: tip error <= this number * reach
+_CLOSE_START = 1e-6
 #: Large changes (rad) of two consecutive joint offsets: theta_i += angle, theta_{i+1} -= angle
 #: If alpha is nearer to pi than to 0, theta_{i+1} += angle.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
@@ -342,7 +344,7 @@ def fit_model(
     best, best_error = written, largest_error(written)
     if best_error <= EPS * fitted_table_roundings(0) * targets.scale:
         return written
-    for i, start in enumerate(start_models(chain, standard, *(FAST_SEARCH if fast else ()))):
+    for i, start in enumerate(start_models(chain, standard, targets, *(FAST_SEARCH if fast else ()))):
         # A fit minimizes the sum of squared errors.
         # Therefore, a fit can increase the largest error.
         model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=largest_error)
@@ -371,14 +373,35 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(tool))
 
 
-def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
+def start_models(
+    chain: FrameChain, standard: DHTable, targets: TargetPoses, *effort: int
+) -> Iterator[TableArrays]:
     """Yield the table, then a table for each likely combination of joint signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
         model = replace(TableArrays.of(standard), senses=senses, base=alignment.base, tool=alignment.tool)
         model.cells[range(len(senses)), model.variable_indices] += alignment.offsets
-        yield model
+        # If an axis is nearly parallel to a prismatic joint's axis, this joint's offset can be wrong by
+        # hundreds of metres. The steps of a fit are too short for such an offset.
+        moved = _fit_translations(model, targets)
+        metres, radians = targets.largest_errors(moved)
+        yield moved if metres + targets.scale * radians <= _CLOSE_START * targets.scale else model
+
+
+def _fit_translations(model: TableArrays, targets: TargetPoses) -> TableArrays:
+    """Fit the offsets of prismatic joints and the translations of base and tool.
+
+    The tip's position is a linear function of these numbers, so one step of any length is exact.
+    """
+    poses, derivatives, _ = tip_poses_and_derivatives(model, targets)
+    translations = np.concatenate([np.tile([True, True, True, False, False, False], 2), model.turns == 0.0])
+    positions = np.tile([True, True, True, False, False, False], len(poses))
+    free = np.zeros(len(translations))
+    free[translations] = np.linalg.lstsq(
+        derivatives[positions][:, translations], targets.error_twists(poses)[positions], rcond=None
+    )[0]
+    return apply_changes(model, free, targets.scale)
 
 
 def fit_free_parameters(

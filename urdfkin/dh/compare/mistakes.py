@@ -140,7 +140,7 @@ class MistakeSearch:
         standard, written = to_convention(table, DHConvention.STANDARD), _make_model(table)
         fits = [
             fit_free_parameters(start, self.targets, large_angles=False)
-            for start in start_models(self.chain, standard, *FAST_SEARCH)
+            for start in start_models(self.chain, standard, self.targets, *FAST_SEARCH)
         ]
         models = [move_end_offsets_to_base_and_tool(fit, written) for fit in fits]
         agreeing = [model for model in models if self._agrees(model)]

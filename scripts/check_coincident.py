@@ -1,0 +1,87 @@
+"""Compare tables of random arms with the arms themselves; axes of the arms nearly coincide.
+
+    python scripts/check_coincident.py                # 1,200 arms, about 15 minutes
+    python scripts/check_coincident.py --arms 60      # the first 60 arms
+
+Half of an arm's axes are at most 1 mm and 1e-3 rad from the previous axis (`nearly_coincident` in
+`tests/dh/test_compare.py`). Each arm gives a standard and a modified table with other signs, zeros, base and
+tool. Each of the first 400 arms also gives a strict table. A table must agree with the arm from which it was
+made. For the first 400 arms, the script also counts the verdicts of `urdfkin same` for the arm and its
+standard table.
+
+Exit 1: a table differs from its arm.
+"""
+
+import argparse
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+
+import urdfkin
+from tests.dh.arms import CONVENTIONS, disguised
+from tests.dh.test_compare import nearly_coincident
+from urdfkin.comparison.result import Verdict
+from urdfkin.dh import make_dh_table
+from urdfkin.dh.compare import TableComparison, compare
+from urdfkin.dh.convert import to_convention
+from urdfkin.errors import UrdfkinError
+from urdfkin.model.chain import make_chain
+from urdfkin.model.tree import JointKind, Limit
+from urdfkin.urdf.writer import to_urdf
+
+MAX_STRICT = MAX_SAME = 400
+_LIMIT = Limit(-1.0, 1.0, 1.0, 1.0)
+
+
+def compare_arm(seed: int) -> Iterator[TableComparison]:
+    """Compare both tables of an arm with the arm."""
+    tree = nearly_coincident(seed)
+    table = disguised(make_dh_table(tree, "tip"), seed)
+    for convention in CONVENTIONS:
+        yield compare(make_chain(tree, "tip"), to_convention(table, convention))
+
+
+def compare_strict(seed: int) -> TableComparison | None:
+    """Compare a strict table of an arm with the arm; None: the arm has no strict table."""
+    tree = nearly_coincident(seed)
+    try:
+        table = make_dh_table(tree, "tip", near_parallel="strict")
+    except UrdfkinError:
+        return None
+    return compare(make_chain(tree, "tip"), disguised(table, seed))
+
+
+def same_verdict(seed: int) -> Verdict:
+    """Compare an arm with its table by `same`."""
+    tree = nearly_coincident(seed)
+    table = disguised(make_dh_table(tree, "tip"), seed)
+    joints = tuple(
+        replace(joint, kind=JointKind.CONTINUOUS) if joint.kind.turns else replace(joint, limit=_LIMIT)
+        for joint in tree.joints
+    )
+    return urdfkin.same(urdfkin.load(to_urdf(replace(tree, joints=joints))), table, bounds=False).verdict
+
+
+def summarize(results: list[TableComparison]) -> str:
+    exact = sum(result.is_exact for result in results)
+    different = sum(not result.agrees for result in results)
+    agree = len(results) - exact - different
+    text = f"{len(results)}: {exact} agree exactly, {agree} agree, {different} differ"
+    errors = [result.metres / result.reach for result in results if result.agrees and not result.is_exact]
+    return f"{text}; largest error {max(errors):.2g} of the reach" if errors else text
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--arms", type=int, default=1200, help="number of arms (default: 1200)")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    results = [result for seed in range(options.arms) for result in compare_arm(seed)]
+    print(f"tables {summarize(results)}", flush=True)
+    strict = [result for seed in range(min(options.arms, MAX_STRICT)) if (result := compare_strict(seed))]
+    print(f"strict tables {summarize(strict)}", flush=True)
+    verdicts = Counter(same_verdict(seed).value for seed in range(min(options.arms, MAX_SAME)))
+    print("same", *(f"{count} {verdict}" for verdict, count in verdicts.most_common()), sep=", ")
+    sys.exit(not all(result.agrees for result in (*results, *strict)))
