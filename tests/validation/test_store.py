@@ -360,7 +360,7 @@ def test_samples_do_not_depend_on_the_size_of_the_chunks(
     tree = make_robot_input("ur5").load().tree
     drawn = []
     for draws in cuts:
-        monkeypatch.setattr(Chunking, "_draws", draws)
+        monkeypatch.setattr(Chunking, "_draws_per_chunk", draws)
         each = [chunk.draw(tree) for chunk in chunks(make_robot_input("ur5"), samples, 3)]
         drawn.append(np.concatenate([np.hstack((x.q, x.v, x.a)) for x in each]))
     assert all(np.array_equal(drawn[0], other) for other in drawn)
@@ -381,11 +381,11 @@ def _peak(chunks_: int) -> int:
     gc.collect()
     tracemalloc.start()
     for index in itertools.chain.from_iterable(pairs):
-        task = Task(0, cut.chunk(robot, 0, index))
-        collector.add(task, replace(found, samples=task.chunk.configurations))
+        task = Task(0, cut.make_chunk(robot, 0, index))
+        collector.add(task, replace(found, samples=task.chunk.configuration_count))
         if index % 1000 == 0:  # otherwise, the peak depends on the garbage collector
             gc.collect()
-    (report,) = collector.reports()
+    (report,) = collector.make_reports()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert report.verdict == ValidationVerdict.VERIFIED
@@ -405,7 +405,7 @@ def test_the_sum_of_chunks_does_not_depend_on_the_order_of_arrival() -> None:
         collector = ResultCollector([all_chunks[0].robot_input], Chunking(60), [range(len(results))])
         for i in order:
             collector.add(Task(0, all_chunks[i]), results[i])
-        (report,) = collector.reports()
+        (report,) = collector.make_reports()
         data = {k: v for k, v in report.as_dict().items() if k not in ("seconds", "timings")}
         reports.add(json.dumps(data))
     assert len(reports) == 1

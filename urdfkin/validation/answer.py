@@ -60,13 +60,13 @@ def make_failure(robot_input: RobotInput, error: Exception) -> Failure:
     if isinstance(error, UrdfError):
         summary = RobotSummary(findings=make_finding_entries(error.findings))
     else:
-        summary = _unchecked_summary(robot_input)
+        summary = _summarize_unchecked(robot_input)
     is_oracle = isinstance(error, OracleError)
     verdict = ValidationVerdict.NOT_VERIFIED if is_oracle else ValidationVerdict.BAD_INPUT
     return Failure(verdict, str(error), summary)
 
 
-def _unchecked_summary(robot_input: RobotInput) -> RobotSummary:
+def _summarize_unchecked(robot_input: RobotInput) -> RobotSummary:
     try:
         return RobotSummary.of(robot_input.make_robot(), None)
     except Exception:
@@ -101,7 +101,7 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
 #: Maximum size of an unpacked file, bytes.
-_MAX_BYTES = 2**27
+_MAX_UNPACKED_BYTES = 2**27
 
 
 class DamagedError(Exception):
@@ -139,7 +139,7 @@ def unpack(key: str, content: bytes) -> dict[str, Any]:
     if hashlib.sha256(data).digest() != checksum:
         raise DamagedError("the checksum in the file does not match its content")
     try:
-        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MAX_BYTES))
+        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MAX_UNPACKED_BYTES))
         if body["key"] != key:
             raise DamagedError("the file belongs to another chunk")
     except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:

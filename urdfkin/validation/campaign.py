@@ -123,13 +123,13 @@ def validate(
         raise InputError(
             "unknown value of `retry`", found=f"retry={retry!r}", remedy='give retry="failed" or None'
         )
-    folder = None if store is None else _folder(store)
+    folder = None if store is None else _as_folder(store)
     if (retry or shard is not None) and store is None:
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
-    given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
+    sources = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # If Pinocchio is missing, an error is raised before the work starts.
-    robot_inputs, unread = make_robot_inputs(given, mimic, root_joint, xacro_args, lock, joints)
+    robot_inputs, read_errors = make_robot_inputs(sources, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         robot_inputs = [replace(x, origin=replace(x.origin, oracle=oracle)) for x in robot_inputs]
     chunking = Chunking(samples)
@@ -141,37 +141,39 @@ def validate(
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
     with contextlib.ExitStack() as stack:
-        saved = None
+        stored_answers = None
         if folder is not None:
             manifest = Manifest.of(robot_inputs, samples, seed, started.isoformat(timespec="seconds"))
             context = open_store(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
-            saved = stack.enter_context(context)
+            stored_answers = stack.enter_context(context)
         try:
-            if saved is not None:
-                campaign.load_answers(saved)
-            for i, error in unread.items():
+            if stored_answers is not None:
+                campaign.load_answers(stored_answers)
+            for i, error in read_errors.items():
                 # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
                 for index in collector.missing_chunks(i):
-                    campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
-            missing = [
+                    campaign.save(campaign.make_task(i, index), make_failure(robot_inputs[i], error))
+            unfinished_inputs = [
                 robot
                 for i, robot in enumerate(robot_inputs)
                 if any(True for _ in collector.missing_chunks(i))
             ]
-            if _should_compile(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
+            if _should_load_kernels(len(unfinished_inputs) * samples) and (
+                isolate or any(map(_can_be_loaded, unfinished_inputs))
+            ):
                 # Load or compile the kernels before the workers start.
                 # The computing time of a robot then does not contain the compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
-            _engine(jobs, isolate, executor).run(campaign.work(), campaign.save)
+            _choose_engine(jobs, isolate, executor).run(campaign.make_work(), campaign.save)
         except KeyboardInterrupt:
             interrupted = True
         except UrdfkinError as error:
             collector.fail_unfinished(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
         except Exception as error:  # Finished results stay in the report.
             collector.fail_unfinished(make_unexpected_failure(error))
-    reports = tuple(collector.reports())
+    reports = tuple(collector.make_reports())
     return ValidationReport(
         robots=reports,
         robots_requested=len(reports),
@@ -183,7 +185,7 @@ def validate(
     )
 
 
-def _folder(store: str | os.PathLike[str]) -> Path:
+def _as_folder(store: str | os.PathLike[str]) -> Path:
     try:
         name = os.fsencode(store)
     except (TypeError, ValueError):
@@ -216,8 +218,8 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
         robot_inputs, manifest.chunking, chunks_of_shard(len(robot_inputs), manifest.chunking)
     )
     _Campaign(robot_inputs, manifest.chunking, manifest.seed, None, collector).load_answers(store)
-    reports, progress = tuple(collector.reports()), collector.state()
-    studies, all_studied = _studies(store, reports)
+    reports, progress = tuple(collector.make_reports()), collector.make_progress()
+    studies, all_studied = _read_studies(store, reports)
     return ValidationReport(
         robots=reports,
         robots_requested=len(reports),
@@ -231,7 +233,9 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
     )
 
 
-def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
+def _read_studies(
+    store: Store, reports: Sequence[RobotReport]
+) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
     if (results := AccuracyStore.from_store(store)) is None:
         return (), True
     studies = [results.read(i) for i, report in enumerate(reports) if report.error_stats]
@@ -243,7 +247,7 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
-def _should_compile(samples: int) -> bool:
+def _should_load_kernels(samples: int) -> bool:
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and all_kernels_on_disk())
 
 
@@ -252,25 +256,27 @@ class _Campaign:
     robot_inputs: Sequence[RobotInput]
     chunking: Chunking
     seed: int
-    memory: int | None
+    memory_limit: int | None
     collector: ResultCollector
     store: Store | None = None
 
-    def task(self, robot: int, index: int) -> Task:
-        return Task(robot, self.chunking.chunk(self.robot_inputs[robot], self.seed, index, self.memory))
+    def make_task(self, robot: int, index: int) -> Task:
+        return Task(
+            robot, self.chunking.make_chunk(self.robot_inputs[robot], self.seed, index, self.memory_limit)
+        )
 
     def load_answers(self, store: Store) -> None:
         for robot in range(len(self.robot_inputs)):
             for index in self.collector.missing_chunks(robot):
                 if (answer := store.read_answer(robot, index)) is not None:
-                    self.collector.add(self.task(robot, index), answer, from_earlier_run=True)
+                    self.collector.add(self.make_task(robot, index), answer, from_earlier_run=True)
         self.store = store
 
-    def work(self) -> Iterator[Iterator[Task]]:
-        return (self._tasks(robot) for robot in range(len(self.robot_inputs)))
+    def make_work(self) -> Iterator[Iterator[Task]]:
+        return (self._make_tasks(robot) for robot in range(len(self.robot_inputs)))
 
-    def _tasks(self, robot: int) -> Iterator[Task]:
-        return (self.task(robot, index) for index in self.collector.missing_chunks(robot))
+    def _make_tasks(self, robot: int) -> Iterator[Task]:
+        return (self.make_task(robot, index) for index in self.collector.missing_chunks(robot))
 
     def save(self, task: Task, answer: Answer) -> None:
         if self.store is not None and not (isinstance(answer, Failure) and answer.is_transient):
@@ -308,7 +314,7 @@ def _warn(message: str) -> None:
     warnings.warn(message, StoreWarning, stacklevel=2)
 
 
-def _engine(jobs: int, isolate: bool, executor: Executor | Engine | None) -> Engine:
+def _choose_engine(jobs: int, isolate: bool, executor: Executor | Engine | None) -> Engine:
     if executor is not None:
         return ExecutorEngine(executor) if isinstance(executor, Executor) else executor
     return ProcessEngine(jobs, isolate=isolate) if isolate or jobs > 1 else SerialEngine()

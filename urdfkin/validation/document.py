@@ -23,10 +23,12 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_UNDEFINED = "null: a result is NaN, or two values with the bound 0 differ."
-Units = Annotated[NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
+_NULL_MEANING = "null: a result is NaN, or two values with the bound 0 differ."
+Units = Annotated[
+    NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
+]
 BoundRatio = Annotated[
-    float | None, doc(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
+    float | None, doc(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_NULL_MEANING}")
 ]
 ReferenceName = Literal["local", "world", "local_world_aligned"]
 
@@ -458,20 +460,20 @@ class ValidationVerdict(StrEnum):
     VERIFIED = "verified"
 
 
-DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
+EXIT_DISAGREES, EXIT_BAD_INPUT, EXIT_NOT_VERIFIED = 1, 2, 3
 #: Exit code of an interrupted run, as in shells: 128 + SIGINT.
-INTERRUPTED = 130
-_WORDS = {
+EXIT_INTERRUPTED = 130
+_VERDICT_WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),
     ValidationVerdict.NOT_VERIFIED: ("is not verified", "are not verified"),
     ValidationVerdict.BAD_INPUT: ("has bad input", "have bad input"),
 }
 OUTCOMES = {
     0: ValidationVerdict.VERIFIED.value,
-    DISAGREEMENT: ValidationVerdict.DISAGREES.value,
-    INTERRUPTED: "interrupted",
-    INPUT: ValidationVerdict.BAD_INPUT.value,
-    UNCHECKED: ValidationVerdict.NOT_VERIFIED.value,
+    EXIT_DISAGREES: ValidationVerdict.DISAGREES.value,
+    EXIT_INTERRUPTED: "interrupted",
+    EXIT_BAD_INPUT: ValidationVerdict.BAD_INPUT.value,
+    EXIT_NOT_VERIFIED: ValidationVerdict.NOT_VERIFIED.value,
 }
 
 
@@ -509,7 +511,7 @@ def outcome(verdicts: Iterable[str], robots_requested: int, interrupted: bool) -
     reasons = ["the validation was interrupted before everything was compared"] if interrupted else []
     reasons += [
         f"{counts[verdict]} of {robots} {words[counts[verdict] > 1]}"
-        for verdict, words in _WORDS.items()
+        for verdict, words in _VERDICT_WORDS.items()
         if counts[verdict]
     ]
     if missing := robots_requested - counts.total():
@@ -521,12 +523,12 @@ def outcome(verdicts: Iterable[str], robots_requested: int, interrupted: bool) -
 
 def _exit_code(counts: Counter[str], interrupted: bool, failed: bool) -> int:
     if counts[ValidationVerdict.DISAGREES]:
-        return DISAGREEMENT
+        return EXIT_DISAGREES
     if interrupted:
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     if counts[ValidationVerdict.BAD_INPUT]:
-        return INPUT
-    return UNCHECKED if failed else 0
+        return EXIT_BAD_INPUT
+    return EXIT_NOT_VERIFIED if failed else 0
 
 
 VALIDATION = DocumentKind(

@@ -24,7 +24,7 @@ from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_disagreements
 
 #: The libraries of a cross check, in the order of columns.
-CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
+CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class CrossCheck:
 
     Attributes:
         by: Name of the second oracle.
-        alone: For each library in `CROSS_CHECKED`, the number of results in which only this library differs.
+        alone: Number of results in which only one library differs, for each of `CROSS_CHECKED_LIBRARIES`.
     """
 
     by: str
@@ -73,7 +73,7 @@ class CrossCheck:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        return asdict(self) | {"alone": dict(zip(CROSS_CHECKED, self.alone, strict=True))}
+        return asdict(self) | {"alone": dict(zip(CROSS_CHECKED_LIBRARIES, self.alone, strict=True))}
 
 
 def add_cross_checks(first: CrossCheck | None, second: CrossCheck | None) -> CrossCheck | None:
@@ -85,32 +85,32 @@ def make_cross_check(
     results: FloatArray,
     pinocchio_results: FloatArray,
     second_oracle_results: FloatArray,
-    first: Bound,
-    second: Bound,
+    pinocchio_bound: Bound,
+    second_oracle_bound: Bound,
 ) -> CrossCheck:
     """Compare urdfkin, Pinocchio and the second oracle in pairs.
 
-    The results have the shape (n, frames, ...). `first` bounds the difference between urdfkin and Pinocchio.
-    `second` bounds the difference between urdfkin and the second oracle.
+    The results have the shape (n, frames, ...). The two bounds are for the differences between urdfkin and
+    Pinocchio, and between urdfkin and the second oracle.
     """
     if not results.size:
         return CrossCheck(by, OraclePair(), OraclePair())
-    agrees_with_pinocchio, _ = _compare_pair(results, pinocchio_results, first)
-    agrees_with_second, urdfkin = _compare_pair(results, second_oracle_results, second)
+    agrees_with_pinocchio, _ = _compare_pair(results, pinocchio_results, pinocchio_bound)
+    agrees_with_second, urdfkin = _compare_pair(results, second_oracle_results, second_oracle_bound)
     pinocchio_agrees_with_second, pinocchio = _compare_pair(
-        pinocchio_results, second_oracle_results, _sum_of_bounds(first, second)
+        pinocchio_results, second_oracle_results, _sum_of_bounds(pinocchio_bound, second_oracle_bound)
     )
     alone = (
         pinocchio_agrees_with_second & ~agrees_with_pinocchio & ~agrees_with_second,
         agrees_with_second & ~agrees_with_pinocchio & ~pinocchio_agrees_with_second,
         agrees_with_pinocchio & ~agrees_with_second & ~pinocchio_agrees_with_second,
     )
-    settled = np.logical_or.reduce(
+    is_decided = np.logical_or.reduce(
         (*alone, agrees_with_pinocchio & agrees_with_second & pinocchio_agrees_with_second)
     )
-    first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
-    counts = first_alone, second_alone, third_alone
-    return CrossCheck(by, urdfkin, pinocchio, counts, int((~settled).sum()))
+    urdfkin_alone, pinocchio_alone, second_oracle_alone = (int(one.sum()) for one in alone)
+    counts = urdfkin_alone, pinocchio_alone, second_oracle_alone
+    return CrossCheck(by, urdfkin, pinocchio, counts, int((~is_decided).sum()))
 
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
@@ -121,9 +121,9 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    size = first.k * first.scale + second.k * second.scale
+    total = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
-        return Bound(size / second.k, second.k)
+        return Bound(total / second.k, second.k)
 
 
 #: Edges of the histogram, in eps * scale: ten bins per decade.
