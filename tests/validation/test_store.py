@@ -21,6 +21,7 @@ import pytest
 from tests.attacks.test_validation_runs import Refusing, chunks
 from tests.cli.running import refused
 from tests.cli.running import urdfkin as run
+from tests.reading import present
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, results
 from urdfkin.validation.answer import (
@@ -409,6 +410,18 @@ def test_the_sum_of_chunks_does_not_depend_on_the_order_of_arrival() -> None:
         data = {k: v for k, v in report.as_dict().items() if k not in ("seconds", "timings")}
         reports.add(json.dumps(data))
     assert len(reports) == 1
+
+
+def test_the_progress_counts_a_robot_that_another_parser_reads_differently() -> None:
+    (chunk,) = chunks(make_robot_input("planar_two_link"), 0, 0)
+    found, states = run_chunk(chunk), list[CampaignProgress]()
+    summary = present(found.summary)
+    reading = present(summary.second_reader).copy()
+    reading["differences"] = ["joint j: axis"]
+    collector = ResultCollector([chunk.robot_input], Chunking(0), [range(1)], states.append)
+    collector.add(Task(0, chunk), replace(found, summary=replace(summary, second_reader=reading)))
+    (report,) = collector.make_reports()
+    assert (report.verdict, states[-1].failures) == (ValidationVerdict.DISAGREES, 1)
 
 
 # -- killed processes, a full disk, two processes at once --------------------------------------------

@@ -123,7 +123,10 @@ class _RobotAnswers:
         if isinstance(answer, Failure):
             self.failures[index] = answer
         else:
-            self._has_disagreed = self._has_disagreed or any(_describe_disagreements(answer.error_stats))
+            summary = answer.summary or EMPTY_SUMMARY
+            self._has_disagreed = self._has_disagreed or any(
+                _describe_disagreements(answer.error_stats, summary)
+            )
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
@@ -194,7 +197,7 @@ def _decide_verdict(
 
     A disagreement takes precedence over a failure.
     """
-    disagreements = [*_describe_disagreements(error_stats), *summary.disagreements]
+    disagreements = list(_describe_disagreements(error_stats, summary))
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
         verdict, reasons = failure.verdict, [failure.reason]
@@ -206,7 +209,7 @@ def _decide_verdict(
     return (ValidationVerdict.DISAGREES if disagreements else verdict), disagreements + reasons
 
 
-def _describe_disagreements(error_stats: dict[Key, ErrorStats]) -> Iterator[str]:
+def _describe_disagreements(error_stats: dict[Key, ErrorStats], summary: RobotSummary) -> Iterator[str]:
     failed = sum(stats.failed for stats in error_stats.values())
     if failed:
         results = sum(stats.results for stats in error_stats.values())
@@ -220,3 +223,4 @@ def _describe_disagreements(error_stats: dict[Key, ErrorStats]) -> Iterator[str]
             f"{found.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
             f" the two others: urdfkin {ours:,}, Pinocchio {theirs:,}, {title} {second_oracle:,})"
         )
+    yield from summary.disagreements
