@@ -47,10 +47,9 @@ from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_r
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
-#: Groups of representations of the orientation.
-#: The table of a study has two rows for analytical Jacobians: "euler angles" and "quaternion".
-#: The study omits the representations by angles about fixed axes.
-#: The Jacobian of such angles has the same rows as a Jacobian of Euler angles, in reverse order.
+#: Representations of the orientation in each row of a study's table for analytical Jacobians.
+#: The study omits angles about fixed axes: their Jacobian has the same rows as a Jacobian of Euler angles,
+#: with the angles in reverse order.
 _ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -102,6 +101,9 @@ def accuracy_study(
 
     Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
     eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
+
+    Raises:
+        InputError: `base` has neither one motion nor one motion for each sample.
     """
     x = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
     longest_path = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
@@ -177,10 +179,7 @@ class _AccuracyBatch:
         )
 
     def _compute_analytical_samples(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """For each representation, yield urdfkin's, Pinocchio's and the exact analytical Jacobians.
-
-        Skip Euler angles near a singularity, and quaternions with an uncertain sign.
-        """
+        """Omit Euler angles near a singularity, and quaternions with an uncertain sign."""
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, part = self.part.plan, self.part
         magnitudes, min_distance = (
@@ -216,11 +215,9 @@ class _AccuracyBatch:
 
 
 def _find_nonzero_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices of each link's nonzero Jacobian columns.
+    """Return indices (n, links, m) of columns: first a link's nonzero columns, then zero columns.
 
-    Returns:
-        (n, links, m) indices for n samples; m is the largest number of nonzero columns of any sample and
-            link. Zero columns fill the rest.
+    m is the largest number of nonzero columns of any sample and link.
     """
     is_zero = ~(scale > 0.0).any(axis=-2)
     width = int((~is_zero).sum(axis=-1).max(initial=0))
@@ -263,10 +260,7 @@ def _make_line(quantity: str, reference: str | None, sample_sets: Sequence[_Accu
 
 @partial(np.vectorize, otypes=[float])
 def _error_bound(x: float, true: Number) -> float:
-    """Return an upper bound on the error of `x`.
-
-    The interval `true` contains the true value.
-    """
+    """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
     return float(abs(as_interval(true) - x).upper())
 
 

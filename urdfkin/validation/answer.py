@@ -100,12 +100,12 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
-#: Maximum size of an unpacked file, bytes.
+#: A file with more unpacked bytes counts as damaged.
 _MAX_UNPACKED_BYTES = 2**27
 
 
 class DamagedError(Exception):
-    """A file is damaged or belongs to another chunk."""
+    """A file is damaged or has another key."""
 
 
 def encode_answer(key: str, answer: Answer) -> bytes:
@@ -127,7 +127,7 @@ def decode_answer(key: str, content: bytes) -> Answer:
 
 
 def pack(key: str, body: dict[str, Any]) -> bytes:
-    """Return the bytes of an answer file; doubles are stored exactly."""
+    """Return the bytes of a file in a store; doubles are stored exactly."""
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 

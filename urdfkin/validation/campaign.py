@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 class StoreWarning(UserWarning):
     """A file of a store is damaged or has an unknown name.
 
-    Lost results are computed again.
+    `validate` computes the lost results again.
     """
 
 
@@ -78,8 +78,8 @@ def validate(
             the results for the neutral configuration, the lower limits and the upper limits. Four of
             25 samples have joint velocities and joint accelerations a hundred times larger.
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
-        jobs: Number of local processes. If a process crashes, its robot is tried once more, alone in a
-            process. Other robots are not affected.
+        jobs: Number of local processes; 1: this process. If one of several processes crashes, its robot is
+            tried once more, alone in a process. Other robots are not affected.
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: Arguments for the .xacro files among the robots, as in `load`.
@@ -90,7 +90,7 @@ def validate(
             the three libraries agree, the report names the third library.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
-        executor: An executor that runs the chunks; None: local processes run them. The executor has the
+        executor: An executor that runs the chunks, instead of `jobs` local processes. The executor has the
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
             run. The function `read_stored_report` makes a report from the folder at any time.
@@ -101,13 +101,15 @@ def validate(
         progress: Callback, called before the work and after each chunk.
 
     Returns:
-        The report on every requested robot. A robot that cannot be read or checked is reported with its
-        error. An interrupt ends the run; finished results stay in the report.
+        The report on every requested robot; with `shard`, on every robot with chunks in the shard. A robot
+        that cannot be read or checked is reported with its error. An interrupt ends the run; finished results
+        stay in the report.
 
     Raises:
-        InputError: The number of samples or the seed is negative, or `jobs` is below one. The oracle is not
-            installed. The store contains a validation with other robots, settings or versions, or another
-            process uses the store.
+        InputError: An argument is invalid, for example `samples` < 0, `jobs` < 1, or `shard` without `store`.
+            The oracle is not installed. The store contains a validation with other robots, settings or
+            versions, or another process uses the store.
+        UnknownNameError: There is no oracle with this name.
         InstallationError: Pinocchio is missing or unsupported, or the installed module `pinocchio` belongs to
             another project.
         SourceError: The folder of the store cannot be created or used.
@@ -198,10 +200,7 @@ def _as_folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _can_be_loaded(robot_input: RobotInput) -> bool:
-    """Return whether a robot can be loaded.
-
-    If loading fails, the robot's first chunk reports the error.
-    """
+    # If loading fails, the robot's first chunk reports the error.
     try:
         robot_input.load()
     except Exception:
@@ -210,7 +209,12 @@ def _can_be_loaded(robot_input: RobotInput) -> bool:
 
 
 def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return a store's report; an incomplete run is marked as interrupted."""
+    """Return a store's report; an incomplete run is marked as interrupted.
+
+    Raises:
+        SourceError: The folder has no manifest, or the manifest cannot be read.
+        InputError: The manifest is not valid, or has another version.
+    """
     store = Store.open_read_only(Path(folder), _warn)
     store.check_names()
     manifest, robot_inputs = store.manifest, store.manifest.make_robot_inputs()
@@ -287,11 +291,14 @@ class _Campaign:
 def chunks_of_shard(robots: int, chunking: Chunking, shard: str | None = None) -> list[range]:
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
-    The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read by
-    one shard only.
+    The shards are contiguous ranges in the order of robots and chunks, so that most robots are read by one
+    shard only. The numbers of chunks of two shards differ by at most one.
 
     >>> chunks_of_shard(2, Chunking(1000), "1/4"), chunks_of_shard(2, Chunking(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
+
+    Raises:
+        InputError: `shard` does not have the form i/n with 1 <= i <= n.
     """
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", "1/1" if shard is None else shard)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):

@@ -44,11 +44,10 @@ from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
-#: Minimum number of chunks of a robot with 200 or more samples.
-#: Several workers can then share the robot.
+#: Minimum number of chunks of a robot with 200 or more samples, so that several workers can share the robot.
 _MIN_CHUNKS = 8
 #: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
-#: A chunk of this size takes one second for a typical robot.
+#: A chunk of this size takes about half a second for a robot with seven joints.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -122,7 +121,7 @@ class Timings:
 class ChunkResult:
     """Result of one chunk, or the sum of several results.
 
-    Only the first chunk of a robot computes `summary`.
+    `summary` is None without the first chunk of the robot.
     """
 
     name: str
@@ -173,7 +172,7 @@ class Chunking:
         return Chunk(robot_input, seed, index, first_draw, samples, memory_limit)
 
     def count_configurations(self, chunks: range) -> int:
-        """Return the number of samples, including the special configurations."""
+        """Return the number of configurations in the chunks, including the special configurations."""
         if not chunks:
             return 0
         size = self._draws_per_chunk * DRAW_SIZE
@@ -214,7 +213,7 @@ def compare_frames(
     timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, ErrorStats]:
-    """Return the error statistics of each quantity."""
+    """Return the error statistics of each quantity in each reference frame, for all frames and joints."""
     error_stats: dict[Key, ErrorStats] = {}
     arguments = robot, oracle, x, first_sample, timings
     for frames in memory.blocks(len(robot.all_frames), memory.frame_array_bytes(len(x.q), robot.nv)):
@@ -242,10 +241,7 @@ class _Comparison:
 
 
 class _FrameComparison(_Comparison):
-    """Comparison of a block of frames with the oracles.
-
-    A joint belongs to the block of its child link.
-    """
+    """Comparison of a block of frames; a joint belongs to the block of its child link."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
@@ -266,10 +262,9 @@ class _FrameComparison(_Comparison):
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Yield the key and error statistics of each quantity, for frames and for joints.
+        """Compare urdfkin's result for a link also with Pinocchio's result for the link's parent joint.
 
-        A joint and its child link have the same frame. Pinocchio has different functions for joints and
-        links, so urdfkin's result is compared with both.
+        Both have the same frame, but Pinocchio has different functions for joints and links.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():

@@ -38,8 +38,7 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * threads + _EXTRA_CHUNKS.
-#: `threads` is the sum over all workers.
+#: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * (threads of all workers) + _EXTRA_CHUNKS.
 #: Every thread then always has a next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
@@ -48,7 +47,7 @@ _MAX_TRIES = 20
 #: Seconds after which the number of workers is read again.
 _REFRESH_SECONDS = 1.0
 #: The scheduler does not need these packages.
-#: If the scheduler has one of the packages, the package must have the same version as in this process.
+#: If the scheduler has one of the packages, its version must be the same as in this process.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _EMPTY_ROBOT_INPUT = RobotInput(b"", Origin(""))
 
@@ -67,7 +66,9 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
         tell: Function that receives messages for the user.
 
     Raises:
-        ClusterError: no scheduler answers, a worker cannot run urdfkin, or versions or code differ.
+        ClusterError: No scheduler answers, a worker cannot run urdfkin, or versions or code differ. Dask
+            opens a port for local workers.
+        InputError: N in `local:N` is not a whole number, or is below one.
     """
     with _connect_client(scheduler) as client:
         _check_versions(client)
@@ -116,10 +117,7 @@ def _connect_client(scheduler: str) -> Iterator[Client]:
 
 
 class _WithoutWebServer:
-    """A scheduler or worker without Dask's web server.
-
-    Dask's web pages are readable by every user of the machine.
-    """
+    """Scheduler or worker without Dask's web pages, which every user of the machine could read."""
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
 
@@ -166,10 +164,7 @@ def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError if library versions or urdfkin's code differ from this machine's.
-
-    Call this function before any robot or chunk is sent to the cluster.
-    """
+    """Raise ClusterError on a difference, before any robot or chunk is sent to the cluster."""
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
@@ -208,12 +203,11 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: Sent chunks without an answer.
-        #: Task of each chunk, and how often the chunk was sent.
+        #: For each sent chunk without an answer: its task, and how often the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: For each robot, a future of the text that describes the robot. The workers store this text.
+        #: For each robot, the future of its text. The workers store this text.
         self._robot_texts: dict[int, Future[bytes]] = {}
-        #: Number of sent chunks without an answer, for each robot.
+        #: For each robot, the number of sent chunks without an answer.
         self._pending_counts = Counter[int]()
         self._limit, self._limit_time = _EXTRA_CHUNKS, float("-inf")
 

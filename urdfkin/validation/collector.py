@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-The results of consecutive chunks are stored as one sum, to save memory. The sum does not depend on the order
-in which the results arrive.
+The results of consecutive chunks are stored as one sum, to save memory. The error statistics in the sum do
+not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
+        label: Name of the robot of the latest chunk; before the work, of the first robot.
     """
 
     robots_done: int
@@ -193,10 +194,7 @@ def _decide_verdict(
     samples: int,
     requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
-    """Return the verdict on a robot and its reasons.
-
-    A disagreement takes precedence over a failure.
-    """
+    """A disagreement takes precedence over a failure."""
     disagreements = list(_describe_disagreements(error_stats, summary))
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:

@@ -4,10 +4,11 @@ Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
 results with the user's results. A mistake explains the whole result if
 
-    max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000.
+    max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000,
 
-If no mistake explains the whole result, the module reports mistakes in single columns of a Jacobian. At most
-three mistakes are reported.
+where each difference is divided by its scale. If no mistake explains the whole result, the module looks for
+mistakes in single columns of a Jacobian, then for a mistake together with exchanged linear and angular rows.
+At most three mistakes are reported.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
 #: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
+#: A difference is divided by its scale, or by _MIN_SCALE * (largest scale) if this number is larger.
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
@@ -65,7 +66,9 @@ class DiagnosisCase:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return max |actual - predicted| / max |actual - expected|.
+        """Return max |actual - predicted| / max |actual - expected|; each difference is divided by its scale.
+
+        Return inf if `predicted` is not finite, or if `actual` equals `expected`.
 
         Args:
             predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.
@@ -282,10 +285,9 @@ class Mistakes:
     def _scale_joints(
         inputs: Inputs, indices: Sequence[tuple[int, int]], factor: float, count: int
     ) -> Inputs:
-        """Return the inputs with some joints' q, v and a multiplied by `factor`.
+        """Multiply some joints' entries in the first `count` of q, v and a by `factor`.
 
-        `indices` contains the index in q, and the index in v and a, of each joint. If `count` is 1, only q
-        is multiplied; if 2, q and v; if 3, q, v and a.
+        `indices` contains (index in q, index in v and a) of each joint.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):
@@ -427,7 +429,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _find_column_mistakes(mistakes: Mistakes, case: DiagnosisCase) -> Iterator[tuple[float, str]]:
-    """Yield (0.0, sentence) for each column with a simple mistake."""
+    """Yield (remainder, sentence) for each column with a simple mistake; the remainder is 0."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

@@ -328,7 +328,7 @@ class ReportedCheck(TypedDict):
     bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        doc("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
+        doc("Smallest and largest bound of the results, in eps * scale; null and 0: nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],
@@ -354,10 +354,10 @@ class ReportedCheck(TypedDict):
 class ReportedTimings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
-    read: Annotated[
-        float, doc("Time of reading the file, of building the models and tables, and of any compilation.")
+    read: Annotated[float, doc("Time of reading the file, and of building the models and tables.")]
+    urdfkin: Annotated[
+        float, doc("Time of computing with urdfkin, and of loading or compiling its kernels in this time.")
     ]
-    urdfkin: Annotated[float, doc("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
     compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
     second_oracle: NotRequired[
@@ -389,7 +389,7 @@ class ReportedRobot(TypedDict):
     """Report of one robot."""
 
     source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
-    name: Annotated[str, doc("The robot's name in its file; the source if the file could not be read.")]
+    name: Annotated[str, doc("The robot's name in its file; the source if the name is unknown.")]
     verdict: Annotated[
         Literal["verified", "disagrees", "not verified", "bad input"], doc("Verdict on the robot.")
     ]
@@ -404,7 +404,13 @@ class ReportedRobot(TypedDict):
     timings: Annotated[
         ReportedTimings | None, doc("Computing times of the parts of the validation; null: unknown.")
     ]
-    model: Annotated[ReportedModel | None, doc("Links and joints; null: the file could not be read.")]
+    model: Annotated[
+        ReportedModel | None,
+        doc(
+            "Links and joints. null: the file could not be read, or the robot's first chunk has no result."
+            " Then there are also no chains."
+        ),
+    ]
     findings: Annotated[list[ReportedFinding], doc("Findings of the linter in the robot's file.")]
     chains: Annotated[list[Chain], doc("Chains of the robot with their Denavit-Hartenberg tables.")]
     second_reader: Annotated[
@@ -430,8 +436,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds. In a report that `urdfkin report DIR` makes from a"
-            " store: the sum of the robots' computing times."
+            "Wall time of the validation in seconds, without compilation before the first chunk. In a report"
+            " that `urdfkin report DIR` makes from a store: the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]

@@ -3,10 +3,11 @@
 An engine runs tasks, and passes the answer of each task to a callback. The order of the answers does not
 matter: the collector sorts the answers, so no result depends on the engine. If the answer of a chunk is a
 `Failure`, an engine may skip the remaining chunks of the same robot. The engine must run all other chunks.
-Tasks are created only when they are needed, so a million tasks take no memory.
+Tasks are created only when they are needed, so a million tasks take little memory.
 
 `WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker.
-If no robot is waiting, a free worker takes chunks of the robot whose latest chunk has the lowest index.
+If no robot is waiting, a free worker takes chunks of the least advanced robot: the index of its latest chunk
+is the lowest.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of submitted chunks whose answers the engine has not yet taken.
+#: Maximum number of chunks in the executor: submitted, and without an answer that the engine has taken.
 MAX_IN_FLIGHT = 512
 
 
@@ -40,8 +41,8 @@ AnswerCallback = Callable[[Task, Answer], None]
 class Engine(Protocol):
     """Interface of an engine.
 
-    If `Engine.run` raises an exception, `validate` runs no further task and returns a report. The answers of
-    finished tasks are kept.
+    If `Engine.run` raises an exception, `validate` runs no further task. Its report contains the answers that
+    the callback has received.
     """
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None: ...

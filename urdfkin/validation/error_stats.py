@@ -133,7 +133,7 @@ def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
 
 #: Edges of the histogram, in eps * scale: ten bins per decade.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
-#: Key of error statistics: the quantity and the reference frame.
+#: Key of error statistics: the quantity, and the reference frame ("" if there is none).
 Key = tuple[str, str]
 Inputs = tuple[list[float], list[float], list[float]]
 
@@ -207,7 +207,11 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile; below the last edge, the error is at most a bin's width."""
+    """Return the upper edge of the percentile's bin, but at most `worst`; 0.0 for the first bin.
+
+    The error is at most the width of the bin. The result for the last bin, which has no upper edge, is the
+    last edge.
+    """
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -229,7 +233,9 @@ def compute_error_stats(
 ) -> ErrorStats:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    `inputs` contains q, v and a of each sample.
+    `frames` are the names of the frames, joints or columns. `first_sample` is the index of the first sample
+    within the robot. `inputs` contains q, v and a of each sample. If the factor k of the bound is not finite
+    or not positive, no result is within the bound.
     """
     n, count = results.shape[:2]
     if not results.size:
