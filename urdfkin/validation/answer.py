@@ -75,12 +75,12 @@ def _summarize_unchecked(robot_input: RobotInput) -> RobotSummary:
 
 def make_unexpected_failure(error: Exception) -> Failure:
     reason = f"unexpected error in urdfkin, please report it: {_name_and_message(error)}"
-    text = "".join(traceback.format_exception(error))
-    return Failure(ValidationVerdict.NOT_VERIFIED, reason, error=text)
+    traceback_text = "".join(traceback.format_exception(error))
+    return Failure(ValidationVerdict.NOT_VERIFIED, reason, error=traceback_text)
 
 
-def make_lost_failure(what: str, error: Exception) -> Failure:
-    reason = f"{what}: {_name_and_message(error)}"
+def make_lost_failure(problem: str, error: Exception) -> Failure:
+    reason = f"{problem}: {_name_and_message(error)}"
     return Failure(ValidationVerdict.NOT_VERIFIED, reason, is_transient=True)
 
 

@@ -243,7 +243,7 @@ def _read_studies(
     if (results := AccuracyStore.from_store(store)) is None:
         return (), True
     studies = [results.read(i) for i, report in enumerate(reports) if report.error_stats]
-    return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
+    return tuple(None if isinstance(study, FailedStudy) else study for study in studies), None not in studies
 
 
 #: Above _WORTH_LOADING samples, loading kernels from disk is faster than interpreting.

@@ -80,8 +80,8 @@ class Chunk:
         return 0 if self.first_draw == 0 else SPECIAL_SAMPLES + self.first_draw * DRAW_SIZE
 
     def draw(self, tree: KinematicTree) -> Samples:
-        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAW_SIZE)))]
-        return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
+        draws = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAW_SIZE)))]
+        return Samples(*(np.concatenate([getattr(x, name) for x in draws]) for name in ("q", "v", "a")))
 
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first_draw + i,)))
@@ -97,7 +97,7 @@ class Timings:
     urdfkin: float = 0.0
     pinocchio: float = 0.0
     compare: float = 0.0
-    second: float = 0.0
+    second_oracle: float = 0.0
 
     def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         begin = time.perf_counter()
@@ -107,14 +107,14 @@ class Timings:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
+        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second_oracle)
 
     def __add__(self, other: Timings) -> Timings:
         return Timings(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def as_dict(self) -> dict[str, Any]:
         parts = {name: round(getattr(self, name), 4) for name in ("read", "urdfkin", "pinocchio", "compare")}
-        return parts | ({"second_oracle": round(self.second, 4)} if self.second else {})
+        return parts | ({"second_oracle": round(self.second_oracle, 4)} if self.second_oracle else {})
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,19 +193,19 @@ class SecondOracleModel:
         results: FloatArray,
         oracle_results: FloatArray,
     ) -> CrossCheck:
-        second = block.timings.time_call(
-            "second", row.ask_oracle, self.oracle, block.make_query(row, reference)
+        second_oracle_results = block.timings.time_call(
+            "second_oracle", row.ask_oracle, self.oracle, block.make_query(row, reference)
         )
         bounds = (
             row.bound(block.plan, magnitudes, reference)
             for magnitudes in (block.magnitudes, self.library.adapt_magnitudes(block.magnitudes))
         )
         if row.object_kind == "joints":
-            bounds = (block.select_joint_bound(one) for one in bounds)
-        return make_cross_check(self.library.name, results, oracle_results, second, *bounds)
+            bounds = (block.select_joint_bound(bound) for bound in bounds)
+        return make_cross_check(self.library.name, results, oracle_results, second_oracle_results, *bounds)
 
 
-def compare_frames(
+def compare_robot(
     robot: Robot,
     oracle: Oracle,
     x: Samples,
@@ -274,8 +274,8 @@ class _FrameComparison(_Comparison):
                 bound = row.bound(self.plan, self.magnitudes, reference)
                 yield self._compare_quantity(row, reference, results, bound, second)
                 for joint in joints:
-                    own, joint_bound = results[:, self.joint_rows], self.select_joint_bound(bound)
-                    yield self._compare_quantity(joint, reference, own, joint_bound, second)
+                    joint_results, joint_bound = results[:, self.joint_rows], self.select_joint_bound(bound)
+                    yield self._compare_quantity(joint, reference, joint_results, joint_bound, second)
 
     def select_joint_bound(self, bound: Bound) -> Bound:
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
@@ -337,22 +337,24 @@ class _ScrewComparison(_Comparison):
         magnitudes = compute_magnitudes(plan, q, *zeros, FIXED_BASE_STATE)
         J = self.timings.time_call("urdfkin", SCREWS.compute_results, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, magnitudes, Reference.WORLD)
-        own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
-        frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
+        entries = [
+            (f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)
+        ]
+        frame, column = np.array(entries, dtype=np.int64).reshape(-1, 2).T
         results = J[:, frame, :, column].swapaxes(0, 1)
         scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
-        names = tuple(tree.joints[joints[f]].name for f, _ in own)
+        names = tuple(tree.joints[joints[f]].name for f, _ in entries)
         return self._compute_stats(results, oracle_results, Bound(scale, bound.k[:, frame, 0]), names)
 
 
-def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return q for the tree `free`, in which mimic joints are independent joints."""
-    expanded = np.empty((len(q), free.nq))
-    for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
-        own = q[:, at : at + joint.kind.nq]
+def _expand_mimic(tree: KinematicTree, free_tree: KinematicTree, q: FloatArray) -> FloatArray:
+    """Return q for the tree `free_tree`, in which mimic joints are independent joints."""
+    expanded = np.empty((len(q), free_tree.nq))
+    for joint, at, free_at in zip(tree.joints, tree.q_index, free_tree.q_index, strict=True):
+        values = q[:, at : at + joint.kind.nq]
         if joint.mimic:
-            own = joint.mimic.multiplier * own + joint.mimic.offset
-        expanded[:, free_at : free_at + joint.kind.nq] = own
+            values = joint.mimic.multiplier * values + joint.mimic.offset
+        expanded[:, free_at : free_at + joint.kind.nq] = values
     return expanded
 
 
@@ -382,7 +384,7 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
     robot, oracle, second = _load_models(chunk)
     summary = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
     timings.read = time.perf_counter() - begin
-    error_stats = compare_frames(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
+    error_stats = compare_robot(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
     seconds = time.perf_counter() - begin
     timings.close(seconds)
     return ChunkResult(

@@ -212,13 +212,13 @@ def _describe_disagreements(error_stats: dict[Key, ErrorStats], summary: RobotSu
     if failed:
         results = sum(stats.results for stats in error_stats.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
-    found = reduce(add_cross_checks, (stats.cross_check for stats in error_stats.values()), None)
-    if found is not None and found.urdfkin.failed:
-        ours, theirs, second_oracle = found.alone
-        title = ORACLES[found.by].title
-        words = "result of urdfkin disagrees" if found.urdfkin.failed == 1 else "results of urdfkin disagree"
+    total = reduce(add_cross_checks, (stats.cross_check for stats in error_stats.values()), None)
+    if total is not None and total.urdfkin.failed:
+        urdfkin, pinocchio, second = total.alone
+        title = ORACLES[total.by].title
+        words = "result of urdfkin disagrees" if total.urdfkin.failed == 1 else "results of urdfkin disagree"
         yield (
-            f"{found.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
-            f" the two others: urdfkin {ours:,}, Pinocchio {theirs:,}, {title} {second_oracle:,})"
+            f"{total.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
+            f" the two others: urdfkin {urdfkin:,}, Pinocchio {pinocchio:,}, {title} {second:,})"
         )
     yield from summary.disagreements
