@@ -87,9 +87,10 @@ def measure_chunk() -> None:
         return 1e3 * median(after - before for before, after in pairwise(moments))
 
     robot, chunking = make_robot_input("ur5"), Chunking(100_000)
-    chunk = chunking.chunk(robot, 0, 1)
+    chunk = chunking.make_chunk(robot, 0, 1)
     result = run_chunk(chunk)
-    print(f"a chunk of {chunk.configurations} samples: {measure_cost(lambda _: run_chunk(chunk), 3):.0f} ms")
+    cost = measure_cost(lambda _: run_chunk(chunk), 3)
+    print(f"a chunk of {chunk.configuration_count} samples: {cost:.0f} ms")
     manifest = Manifest.of([robot], chunking.samples, 0, "now")
     with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as store:
         print(f"time to store it: {measure_cost(lambda i: store.write_answer(0, i, result)):.2f} ms")

@@ -30,7 +30,7 @@ run = partial(subprocess.run, capture_output=True, text=True, check=False)
 
 def chunks(robot: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
     cut = Chunking(samples)
-    return (cut.chunk(robot, seed, index) for index in range(len(cut)))
+    return (cut.make_chunk(robot, seed, index) for index in range(len(cut)))
 
 
 def verdicts(report: ValidationReport) -> list[str]:
@@ -121,7 +121,7 @@ def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_runs_all_chunk
             future.set_result(fn(*args, **kwargs))
             return future
 
-    monkeypatch.setattr(engines, "IN_FLIGHT", 3)
+    monkeypatch.setattr(engines, "MAX_IN_FLIGHT", 3)
     report = validate(["planar_two_link", "double_pendulum"], samples=200, executor=Counting())
     assert report.passed
     assert (most, submitted) == (3, 0)
@@ -132,7 +132,7 @@ def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_runs_all_chunk
 def test_the_remaining_chunks_of_a_failed_robot_are_not_run(
     how: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engines, "IN_FLIGHT", 1)
+    monkeypatch.setattr(engines, "MAX_IN_FLIGHT", 1)
     ran: list[int] = []
 
     def failing(chunk: Chunk) -> ChunkResult:
@@ -227,7 +227,7 @@ def test_an_interrupt_keeps_finished_chunks_and_drops_waiting_chunks(
             raise KeyboardInterrupt
         return run_chunk(chunk)
 
-    monkeypatch.setattr(engines, "IN_FLIGHT", 1)
+    monkeypatch.setattr(engines, "MAX_IN_FLIGHT", 1)
     monkeypatch.setattr(answer, "run_chunk", interrupted)
     executor = None if engine == "serial" else Refusing(10**6, when_asked=True)
     report = validate(ROBOTS, samples=60, executor=executor)

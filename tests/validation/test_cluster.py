@@ -94,7 +94,7 @@ def test_workers_of_a_local_cluster_open_no_port(two: Cluster) -> None:
 
 
 def test_a_version_of_dask_that_opens_a_port_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(cluster._Portless, "start_http_server")
+    monkeypatch.delattr(cluster._WithoutWebServer, "start_http_server")
     with pytest.raises(ClusterError, match="this version of Dask opens a port"), connect_cluster("local:1"):
         pass
 

@@ -56,6 +56,11 @@ def test_a_result_that_differs_from_two_equal_results_is_the_outlier(
     assert (found.alone, found.undecided) == (alone, undecided)
 
 
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_result_that_is_not_finite_has_an_infinite_ratio_to_its_bound(wrong: float) -> None:
+    assert checked_results(wrong, 0, 0).urdfkin == OraclePair(1, np.inf, np.inf)
+
+
 def test_the_sum_of_cross_checks_does_not_depend_on_the_order() -> None:
     some = [checked_results(*results) for results in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
     (total,) = {reduce(add, order) for order in itertools.permutations(some)}

@@ -41,6 +41,14 @@ def test_a_result_outside_its_bound_is_counted_and_disagrees(units: float, faile
     assert present(found.case).frame == "b"
 
 
+@pytest.mark.parametrize("k", [0.0, -1.0, math.inf, math.nan])
+def test_no_result_is_within_an_invalid_bound(k: float) -> None:
+    ours = np.ones((1, 3, 6))
+    bound = Bound(np.ones_like(ours), np.full((1, 3, 1), k))
+    found = compute_error_stats(ours, ours, bound, FRAMES, 0, [([0.0], [0.0], [0.0])])
+    assert (found.failed, found.bound_ratio, present(found.case).bound_ratio) == (3, math.inf, math.inf)
+
+
 @pytest.mark.parametrize("cut", [1, 3, 7])
 def test_tallies_of_any_division_into_samples_and_frames_add_up(cut: int) -> None:
     units = np.round(np.random.default_rng(5).uniform(0.0, 12.0, (8, 3)))

@@ -24,7 +24,7 @@ from tests.urdfs import robot as robot_text
 from urdfkin.model.conventions import find_convention
 from urdfkin.report.junit import function_checks_as_junit
 from urdfkin.robot import Robot
-from urdfkin.validation.diagnosis import _HALVES
+from urdfkin.validation.diagnosis import _SWAPPED_HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
 from urdfkin.validation.programs import Program, ProgramError
 from urdfkin.verify.quantities import recursive_quantities
@@ -80,7 +80,9 @@ Wrong = Callable[[Callable[..., Any], Robot, str], Callable[..., Any]]
 #: Mistakes: quantities, part of the diagnosis, and a function that makes a right function wrong.
 SIX = ("velocity", "jacobian", "jacobian rate", "hessian", "acceleration")
 MISTAKES: dict[str, tuple[tuple[str, ...], str, Wrong]] = {
-    "angular rows first": (SIX, "the angular rows come first", lambda f, r, x: lambda *i: f(*i)[_HALVES]),
+    "angular rows first": (
+        SIX, "the angular rows come first", lambda f, r, x: lambda *i: f(*i)[_SWAPPED_HALVES],
+    ),
     "transposed": (("placement", "jacobian"), "transposed", lambda f, r, x: lambda *i: f(*i).T),
     "degrees": (("placement", "jacobian", "acceleration"), "takes q in degrees",
                 lambda f, r, x: lambda q, *i: f(scale_angles(q, r, np.pi / 180), *i)),
@@ -184,7 +186,7 @@ def test_the_diagnosis_names_a_missing_mimic_column(name: str) -> None:
 
 def test_the_diagnosis_describes_two_mistakes_and_the_joint_order_of_another_tool() -> None:
     local = computed(robot_of("ur5"), "jacobian", "tool0", "local")
-    (words,) = check("ur5", "jacobian", lambda q: local(q)[_HALVES]).diagnoses
+    (words,) = check("ur5", "jacobian", lambda q: local(q)[_SWAPPED_HALVES]).diagnoses
     assert "is in LOCAL" in words
     assert words.endswith("and the angular rows come first")
     tool = robot_of("a1").with_convention("isaaclab")
@@ -319,7 +321,7 @@ def test_a_function_in_a_convention_agrees_and_exchanged_rows_are_named(
         return
     assert verify_function(right, robot, quantity, **how).agrees
     if quantity != "placement":
-        found = verify_function(lambda *i: right(*i)[_HALVES], robot, quantity, **how)
+        found = verify_function(lambda *i: right(*i)[_SWAPPED_HALVES], robot, quantity, **how)
         check_diagnosis(found, "rows come first")
 
 

@@ -21,6 +21,7 @@ import pytest
 from tests.attacks.test_validation_runs import Refusing, chunks
 from tests.cli.running import refused
 from tests.cli.running import urdfkin as run
+from tests.reading import present
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, results
 from urdfkin.validation.answer import (
@@ -360,7 +361,7 @@ def test_samples_do_not_depend_on_the_size_of_the_chunks(
     tree = make_robot_input("ur5").load().tree
     drawn = []
     for draws in cuts:
-        monkeypatch.setattr(Chunking, "_draws", draws)
+        monkeypatch.setattr(Chunking, "_draws_per_chunk", draws)
         each = [chunk.draw(tree) for chunk in chunks(make_robot_input("ur5"), samples, 3)]
         drawn.append(np.concatenate([np.hstack((x.q, x.v, x.a)) for x in each]))
     assert all(np.array_equal(drawn[0], other) for other in drawn)
@@ -381,11 +382,11 @@ def _peak(chunks_: int) -> int:
     gc.collect()
     tracemalloc.start()
     for index in itertools.chain.from_iterable(pairs):
-        task = Task(0, cut.chunk(robot, 0, index))
-        collector.add(task, replace(found, samples=task.chunk.configurations))
+        task = Task(0, cut.make_chunk(robot, 0, index))
+        collector.add(task, replace(found, samples=task.chunk.configuration_count))
         if index % 1000 == 0:  # otherwise, the peak depends on the garbage collector
             gc.collect()
-    (report,) = collector.reports()
+    (report,) = collector.make_reports()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert report.verdict == ValidationVerdict.VERIFIED
@@ -405,10 +406,22 @@ def test_the_sum_of_chunks_does_not_depend_on_the_order_of_arrival() -> None:
         collector = ResultCollector([all_chunks[0].robot_input], Chunking(60), [range(len(results))])
         for i in order:
             collector.add(Task(0, all_chunks[i]), results[i])
-        (report,) = collector.reports()
+        (report,) = collector.make_reports()
         data = {k: v for k, v in report.as_dict().items() if k not in ("seconds", "timings")}
         reports.add(json.dumps(data))
     assert len(reports) == 1
+
+
+def test_the_progress_counts_a_robot_that_another_parser_reads_differently() -> None:
+    (chunk,) = chunks(make_robot_input("planar_two_link"), 0, 0)
+    found, states = run_chunk(chunk), list[CampaignProgress]()
+    summary = present(found.summary)
+    reading = present(summary.second_reader).copy()
+    reading["differences"] = ["joint j: axis"]
+    collector = ResultCollector([chunk.robot_input], Chunking(0), [range(1)], states.append)
+    collector.add(Task(0, chunk), replace(found, summary=replace(summary, second_reader=reading)))
+    (report,) = collector.make_reports()
+    assert (report.verdict, states[-1].failures) == (ValidationVerdict.DISAGREES, 1)
 
 
 # -- killed processes, a full disk, two processes at once --------------------------------------------

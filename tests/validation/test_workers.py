@@ -172,13 +172,13 @@ CUT, NO_ROBOT = Chunking(100), RobotInput(b"", Origin(""))
 
 def work(robots: int) -> Iterator[Iterator[Task]]:
     """Return four chunks for each robot."""
-    return (iter([Task(i, CUT.chunk(NO_ROBOT, 0, k)) for k in range(4)]) for i in range(robots))
+    return (iter([Task(i, CUT.make_chunk(NO_ROBOT, 0, k)) for k in range(4)]) for i in range(robots))
 
 
 def take(queue: WorkQueue, tasks: RobotTasks | None = None) -> tuple[Task, RobotTasks]:
     """Take the next task of a worker's robot, or the first task for a worker without a robot."""
     task = queue.next(tasks) if tasks is not None else None
-    return (task, tasks) if task is not None and tasks is not None else present(queue.first())
+    return (task, tasks) if task is not None and tasks is not None else present(queue.take_for_idle_worker())
 
 
 def test_two_workers_start_with_different_robots_and_both_work_on_the_last_robot() -> None:
@@ -189,16 +189,16 @@ def test_two_workers_start_with_different_robots_and_both_work_on_the_last_robot
         taken.append((turn % 2, task.robot, task.chunk.index))
     assert {(worker, robot) for worker, robot, _ in taken} == {(0, 0), (1, 1), (0, 2), (1, 2)}
     assert sorted((robot, chunk) for _, robot, chunk in taken) == [(i, k) for i in range(3) for k in range(4)]
-    assert queue.first() is None
+    assert queue.take_for_idle_worker() is None
 
 
 @pytest.mark.parametrize("shared", [True, False])
 def test_a_returned_task_is_assigned_again_and_a_withdrawn_robot_has_no_task(shared: bool) -> None:
-    queue = WorkQueue(work(2), shared=shared)
+    queue = WorkQueue(work(2), share_robots=shared)
     task, tasks = take(queue)
     queue.put_back(task, tasks)
     assert take(queue)[0] == task
-    assert [left.chunk.index for left in queue.withdraw(0)] == [1, 2, 3]
+    assert [left.chunk.index for left in queue.take_remaining_tasks(0)] == [1, 2, 3]
     assert queue.next(tasks) is None
     assert take(queue)[0].robot == 1
 
@@ -211,6 +211,6 @@ def test_a_free_worker_joins_the_robot_with_the_most_remaining_chunks_if_sharing
     task, tasks = take(queue)
     assert tasks is second
     assert (task.robot, task.chunk.index) == (1, 1)
-    queue = WorkQueue(work(1), shared=False)
-    assert queue.first() is not None
-    assert queue.first() is None
+    queue = WorkQueue(work(1), share_robots=False)
+    assert queue.take_for_idle_worker() is not None
+    assert queue.take_for_idle_worker() is None

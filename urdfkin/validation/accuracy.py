@@ -46,12 +46,11 @@ from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, 
 from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_INTERVALS = np.vectorize(as_interval, otypes=[object])
-#: Groups of representations of the orientation.
-#: The table of a study has two rows for analytical Jacobians: "euler angles" and "quaternion".
-#: The study omits the representations by angles about fixed axes.
-#: The Jacobian of such angles has the same rows as a Jacobian of Euler angles, in reverse order.
-_REPRESENTATIONS = {
+_as_intervals = np.vectorize(as_interval, otypes=[object])
+#: Representations of the orientation in each row of a study's table for analytical Jacobians.
+#: The study omits angles about fixed axes: their Jacobian has the same rows as a Jacobian of Euler angles,
+#: with the angles in reverse order.
+_ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
@@ -102,11 +101,14 @@ def accuracy_study(
 
     Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
     eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
+
+    Raises:
+        InputError: `base` has neither one motion nor one motion for each sample.
     """
-    drawn = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
-    longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
-    with precision(max(DIGITS, enough_digits(longest))):
-        lines = tuple(_AccuracyBatch(robot, drawn, base).lines())
+    x = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
+    longest_path = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
+    with precision(max(DIGITS, enough_digits(longest_path))):
+        lines = tuple(_AccuracyBatch(robot, x, base).lines())
         return AccuracyStudy(robot.name, samples, seed, lines, base is not None)
 
 
@@ -129,14 +131,19 @@ class _AccuracyBatch:
             slice(0, len(x.q))
         )
         self.links = range(len(robot.tree.links))
-        joints, moves = read_exact_joints(robot.urdf, robot.tree), self.part.query.base
+        joints, base_motions = read_exact_joints(robot.urdf, robot.tree), self.part.query.base
         bases = [
-            None if moves is None
-            else make_base_state(BaseRows(moves.placement[k], moves.velocity[k], moves.acceleration[k]))
+            None
+            if base_motions is None
+            else make_base_state(
+                BaseRows(base_motions.placement[k], base_motions.velocity[k], base_motions.acceleration[k])
+            )
             for k in range(len(x.q))
-        ]  # fmt: skip
+        ]
         rows = zip(*self.part.query.inputs, bases, strict=True)
-        self.motions = [compute_motion(robot.tree, joints, q, v, a, base=own) for q, v, a, own in rows]
+        self.motions = [
+            compute_motion(robot.tree, joints, q, v, a, base=base_state) for q, v, a, base_state in rows
+        ]
 
     def lines(self) -> Iterator[AccuracyLine]:
         for reference in (None, *Reference):
@@ -144,8 +151,10 @@ class _AccuracyBatch:
                 if row.compute_intervals is not None and reference in row.references:
                     name = None if reference is None else reference.name.lower()
                     yield _make_line(row.name, name, [self._compute_samples(row, reference)])
-        for name, representations in _REPRESENTATIONS.items():
-            yield _make_line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
+        for name, representations in _ORIENTATION_REPRESENTATIONS.items():
+            yield _make_line(
+                ANALYTICAL_JACOBIAN.name, name, list(self._compute_analytical_samples(representations))
+            )
 
     def _compute_samples(self, row: Quantity, reference: Reference | None) -> _AccuracySamples:
         reference = _ALIGNED if reference is None else reference
@@ -159,63 +168,63 @@ class _AccuracyBatch:
         return _AccuracySamples(
             urdfkin_results,
             pinocchio_results,
-            self._true(row, reference).reshape(urdfkin_results.shape),
+            self._enclose_true_values(row, reference).reshape(urdfkin_results.shape),
             scale,
         )
 
-    def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
+    def _enclose_true_values(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
         return np.array(
             [[row.enclose(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,
         )
 
-    def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """For each representation, yield urdfkin's, Pinocchio's and the exact analytical Jacobians.
-
-        Skip Euler angles near a singularity, and quaternions with an uncertain sign.
-        """
+    def _compute_analytical_samples(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
+        """Omit Euler angles near a singularity, and quaternions with an uncertain sign."""
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
-        plan, x = self.part.plan, self.part
-        size, nearest = (
-            compute_magnitudes(plan, x.q, None, None, x.state),
+        plan, part = self.part.plan, self.part
+        magnitudes, min_distance = (
+            compute_magnitudes(plan, part.q, None, None, part.state),
             max(MIN_SINGULARITY_DISTANCE, singularity_margin(plan)),
         )
-        jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
+        jacobian = JACOBIAN.bound(plan, magnitudes, _ALIGNED)
         R, R_pinocchio = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
-        moving = _moving_columns(J_v.scale)
-        R_true, J_true = map(_INTERVALS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
+        nonzero = _find_nonzero_columns(J_v.scale)
+        R_true, J_true = map(_as_intervals, (poses.true[..., :3, :3], _take_columns(J_v.true, nonzero)))
         for name in representations:
             if name == QUATERNION:
-                bound, quat = quaternion_jacobian_bound(jacobian), quaternion_of(R)
-                clear = np.abs(quat[..., 3]) > EPS * result_k(bound, quat.shape[:-1])
-                true = quaternion_jacobian(exact_quaternion(R_true[clear], quat[clear]), J_true[clear])
+                bound, quaternions = quaternion_jacobian_bound(jacobian), quaternion_of(R)
+                is_regular = np.abs(quaternions[..., 3]) > EPS * result_k(bound, quaternions.shape[:-1])
+                true = quaternion_jacobian(
+                    exact_quaternion(R_true[is_regular], quaternions[is_regular]), J_true[is_regular]
+                )
             else:
-                clear = singularity_distance(name, euler_of(name, R)) > nearest
-                true, apart = euler_jacobian(name, R_true[clear], J_true[clear])
-                everywhere = np.ones(clear.shape)
-                everywhere[clear] = apart
-                bound = euler_jacobian_bound(jacobian, size, everywhere)
-            urdfkin_results = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
-            pinocchio_results = analytical_jacobian(name, R_pinocchio[clear], J_v.pinocchio[clear], 0.0)
+                is_regular = singularity_distance(name, euler_of(name, R)) > min_distance
+                true, distances = euler_jacobian(name, R_true[is_regular], J_true[is_regular])
+                all_distances = np.ones(is_regular.shape)
+                all_distances[is_regular] = distances
+                bound = euler_jacobian_bound(jacobian, magnitudes, all_distances)
+            urdfkin_results = analytical_jacobian(name, R[is_regular], J_v.urdfkin[is_regular], 0.0)
+            pinocchio_results = analytical_jacobian(
+                name, R_pinocchio[is_regular], J_v.pinocchio[is_regular], 0.0
+            )
             urdfkin_results, pinocchio_results, scale = (
-                _columns(J, moving[clear]) for J in (urdfkin_results, pinocchio_results, bound.scale[clear])
+                _take_columns(J, nonzero[is_regular])
+                for J in (urdfkin_results, pinocchio_results, bound.scale[is_regular])
             )
             yield _AccuracySamples(urdfkin_results, pinocchio_results, true, scale)
 
 
-def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices of each link's nonzero Jacobian columns.
+def _find_nonzero_columns(scale: FloatArray) -> NDArray[np.intp]:
+    """Return indices (n, links, m) of columns: first a link's nonzero columns, then zero columns.
 
-    Returns:
-        (n, links, m) indices for n samples; m is the largest number of nonzero columns of any sample and
-            link. Zero columns fill the rest.
+    m is the largest number of nonzero columns of any sample and link.
     """
-    idle = ~(scale > 0.0).any(axis=-2)
-    most = int((~idle).sum(axis=-1).max(initial=0))
-    return np.argsort(idle, axis=-1, kind="stable")[..., :most]
+    is_zero = ~(scale > 0.0).any(axis=-2)
+    width = int((~is_zero).sum(axis=-1).max(initial=0))
+    return np.argsort(is_zero, axis=-1, kind="stable")[..., :width]
 
 
-def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
+def _take_columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
     return np.take_along_axis(J, indices[..., np.newaxis, :], axis=-1)
 
 
@@ -232,25 +241,26 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
     return unit
 
 
-def _make_line(quantity: str, reference: str | None, compared: Sequence[_AccuracySamples]) -> AccuracyLine:
-    errors_of_each: tuple[list[FloatArray], list[FloatArray]] = [], []
-    for urdfkin_results, pinocchio_results, true, scale in compared:
+def _make_line(quantity: str, reference: str | None, sample_sets: Sequence[_AccuracySamples]) -> AccuracyLine:
+    errors_of_libraries: tuple[list[FloatArray], list[FloatArray]] = [], []
+    for urdfkin_results, pinocchio_results, true, scale in sample_sets:
         nonzero = scale > 0.0
         units = np.maximum(EPS * scale[nonzero], SMALLEST_SUBNORMAL)
-        for errors, results in zip(errors_of_each, (urdfkin_results, pinocchio_results), strict=True):
+        for errors, results in zip(errors_of_libraries, (urdfkin_results, pinocchio_results), strict=True):
             errors.append(_error_bound(results[nonzero], true[nonzero]) / units)
-    own_errors, their_errors = map(np.concatenate, errors_of_each)
+    urdfkin_errors, pinocchio_errors = map(np.concatenate, errors_of_libraries)
     return AccuracyLine(
-        quantity, reference, len(own_errors), _summarize_errors(own_errors), _summarize_errors(their_errors)
+        quantity,
+        reference,
+        len(urdfkin_errors),
+        _summarize_errors(urdfkin_errors),
+        _summarize_errors(pinocchio_errors),
     )
 
 
 @partial(np.vectorize, otypes=[float])
 def _error_bound(x: float, true: Number) -> float:
-    """Return an upper bound on the error of `x`.
-
-    The interval `true` contains the true value.
-    """
+    """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
     return float(abs(as_interval(true) - x).upper())
 
 

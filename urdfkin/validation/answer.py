@@ -60,13 +60,13 @@ def make_failure(robot_input: RobotInput, error: Exception) -> Failure:
     if isinstance(error, UrdfError):
         summary = RobotSummary(findings=make_finding_entries(error.findings))
     else:
-        summary = _unchecked_summary(robot_input)
+        summary = _summarize_unchecked(robot_input)
     is_oracle = isinstance(error, OracleError)
     verdict = ValidationVerdict.NOT_VERIFIED if is_oracle else ValidationVerdict.BAD_INPUT
     return Failure(verdict, str(error), summary)
 
 
-def _unchecked_summary(robot_input: RobotInput) -> RobotSummary:
+def _summarize_unchecked(robot_input: RobotInput) -> RobotSummary:
     try:
         return RobotSummary.of(robot_input.make_robot(), None)
     except Exception:
@@ -75,12 +75,12 @@ def _unchecked_summary(robot_input: RobotInput) -> RobotSummary:
 
 def make_unexpected_failure(error: Exception) -> Failure:
     reason = f"unexpected error in urdfkin, please report it: {_name_and_message(error)}"
-    text = "".join(traceback.format_exception(error))
-    return Failure(ValidationVerdict.NOT_VERIFIED, reason, error=text)
+    traceback_text = "".join(traceback.format_exception(error))
+    return Failure(ValidationVerdict.NOT_VERIFIED, reason, error=traceback_text)
 
 
-def make_lost_failure(what: str, error: Exception) -> Failure:
-    reason = f"{what}: {_name_and_message(error)}"
+def make_lost_failure(problem: str, error: Exception) -> Failure:
+    reason = f"{problem}: {_name_and_message(error)}"
     return Failure(ValidationVerdict.NOT_VERIFIED, reason, is_transient=True)
 
 
@@ -100,12 +100,12 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
-#: Maximum size of an unpacked file, bytes.
-_MAX_BYTES = 2**27
+#: A file with more unpacked bytes counts as damaged.
+_MAX_UNPACKED_BYTES = 2**27
 
 
 class DamagedError(Exception):
-    """A file is damaged or belongs to another chunk."""
+    """A file is damaged or has another key."""
 
 
 def encode_answer(key: str, answer: Answer) -> bytes:
@@ -127,7 +127,7 @@ def decode_answer(key: str, content: bytes) -> Answer:
 
 
 def pack(key: str, body: dict[str, Any]) -> bytes:
-    """Return the bytes of an answer file; doubles are stored exactly."""
+    """Return the bytes of a file in a store; doubles are stored exactly."""
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 
@@ -139,7 +139,7 @@ def unpack(key: str, content: bytes) -> dict[str, Any]:
     if hashlib.sha256(data).digest() != checksum:
         raise DamagedError("the checksum in the file does not match its content")
     try:
-        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MAX_BYTES))
+        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MAX_UNPACKED_BYTES))
         if body["key"] != key:
             raise DamagedError("the file belongs to another chunk")
     except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:

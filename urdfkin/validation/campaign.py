@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 class StoreWarning(UserWarning):
     """A file of a store is damaged or has an unknown name.
 
-    Lost results are computed again.
+    `validate` computes the lost results again.
     """
 
 
@@ -78,8 +78,8 @@ def validate(
             the results for the neutral configuration, the lower limits and the upper limits. Four of
             25 samples have joint velocities and joint accelerations a hundred times larger.
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
-        jobs: Number of local processes. If a process crashes, its robot is tried once more, alone in a
-            process. Other robots are not affected.
+        jobs: Number of local processes; 1: this process. If one of several processes crashes, its robot is
+            tried once more, alone in a process. Other robots are not affected.
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: Arguments for the .xacro files among the robots, as in `load`.
@@ -90,7 +90,7 @@ def validate(
             the three libraries agree, the report names the third library.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
-        executor: An executor that runs the chunks; None: local processes run them. The executor has the
+        executor: An executor that runs the chunks, instead of `jobs` local processes. The executor has the
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
             run. The function `read_stored_report` makes a report from the folder at any time.
@@ -101,13 +101,15 @@ def validate(
         progress: Callback, called before the work and after each chunk.
 
     Returns:
-        The report on every requested robot. A robot that cannot be read or checked is reported with its
-        error. An interrupt ends the run; finished results stay in the report.
+        The report on every requested robot; with `shard`, on every robot with chunks in the shard. A robot
+        that cannot be read or checked is reported with its error. An interrupt ends the run; finished results
+        stay in the report.
 
     Raises:
-        InputError: The number of samples or the seed is negative, or `jobs` is below one. The oracle is not
-            installed. The store contains a validation with other robots, settings or versions, or another
-            process uses the store.
+        InputError: An argument is invalid, for example `samples` < 0, `jobs` < 1, or `shard` without `store`.
+            The oracle is not installed. The store contains a validation with other robots, settings or
+            versions, or another process uses the store.
+        UnknownNameError: There is no oracle with this name.
         InstallationError: Pinocchio is missing or unsupported, or the installed module `pinocchio` belongs to
             another project.
         SourceError: The folder of the store cannot be created or used.
@@ -123,13 +125,13 @@ def validate(
         raise InputError(
             "unknown value of `retry`", found=f"retry={retry!r}", remedy='give retry="failed" or None'
         )
-    folder = None if store is None else _folder(store)
+    folder = None if store is None else _as_folder(store)
     if (retry or shard is not None) and store is None:
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
-    given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
+    sources = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # If Pinocchio is missing, an error is raised before the work starts.
-    robot_inputs, unread = make_robot_inputs(given, mimic, root_joint, xacro_args, lock, joints)
+    robot_inputs, read_errors = make_robot_inputs(sources, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         robot_inputs = [replace(x, origin=replace(x.origin, oracle=oracle)) for x in robot_inputs]
     chunking = Chunking(samples)
@@ -141,37 +143,39 @@ def validate(
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
     with contextlib.ExitStack() as stack:
-        saved = None
+        stored_answers = None
         if folder is not None:
             manifest = Manifest.of(robot_inputs, samples, seed, started.isoformat(timespec="seconds"))
             context = open_store(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
-            saved = stack.enter_context(context)
+            stored_answers = stack.enter_context(context)
         try:
-            if saved is not None:
-                campaign.load_answers(saved)
-            for i, error in unread.items():
+            if stored_answers is not None:
+                campaign.load_answers(stored_answers)
+            for i, error in read_errors.items():
                 # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
                 for index in collector.missing_chunks(i):
-                    campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
-            missing = [
+                    campaign.save(campaign.make_task(i, index), make_failure(robot_inputs[i], error))
+            unfinished_inputs = [
                 robot
                 for i, robot in enumerate(robot_inputs)
                 if any(True for _ in collector.missing_chunks(i))
             ]
-            if _should_compile(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
+            if _should_load_kernels(len(unfinished_inputs) * samples) and (
+                isolate or any(map(_can_be_loaded, unfinished_inputs))
+            ):
                 # Load or compile the kernels before the workers start.
                 # The computing time of a robot then does not contain the compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
-            _engine(jobs, isolate, executor).run(campaign.work(), campaign.save)
+            _choose_engine(jobs, isolate, executor).run(campaign.make_work(), campaign.save)
         except KeyboardInterrupt:
             interrupted = True
         except UrdfkinError as error:
             collector.fail_unfinished(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
         except Exception as error:  # Finished results stay in the report.
             collector.fail_unfinished(make_unexpected_failure(error))
-    reports = tuple(collector.reports())
+    reports = tuple(collector.make_reports())
     return ValidationReport(
         robots=reports,
         robots_requested=len(reports),
@@ -183,7 +187,7 @@ def validate(
     )
 
 
-def _folder(store: str | os.PathLike[str]) -> Path:
+def _as_folder(store: str | os.PathLike[str]) -> Path:
     try:
         name = os.fsencode(store)
     except (TypeError, ValueError):
@@ -196,10 +200,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _can_be_loaded(robot_input: RobotInput) -> bool:
-    """Return whether a robot can be loaded.
-
-    If loading fails, the robot's first chunk reports the error.
-    """
+    # If loading fails, the robot's first chunk reports the error.
     try:
         robot_input.load()
     except Exception:
@@ -208,7 +209,12 @@ def _can_be_loaded(robot_input: RobotInput) -> bool:
 
 
 def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return a store's report; an incomplete run is marked as interrupted."""
+    """Return a store's report; an incomplete run is marked as interrupted.
+
+    Raises:
+        SourceError: The folder has no manifest, or the manifest cannot be read.
+        InputError: The manifest is not valid, or has another version.
+    """
     store = Store.open_read_only(Path(folder), _warn)
     store.check_names()
     manifest, robot_inputs = store.manifest, store.manifest.make_robot_inputs()
@@ -216,8 +222,8 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
         robot_inputs, manifest.chunking, chunks_of_shard(len(robot_inputs), manifest.chunking)
     )
     _Campaign(robot_inputs, manifest.chunking, manifest.seed, None, collector).load_answers(store)
-    reports, progress = tuple(collector.reports()), collector.state()
-    studies, all_studied = _studies(store, reports)
+    reports, progress = tuple(collector.make_reports()), collector.make_progress()
+    studies, all_studied = _read_studies(store, reports)
     return ValidationReport(
         robots=reports,
         robots_requested=len(reports),
@@ -231,11 +237,13 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
     )
 
 
-def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
+def _read_studies(
+    store: Store, reports: Sequence[RobotReport]
+) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
     if (results := AccuracyStore.from_store(store)) is None:
         return (), True
     studies = [results.read(i) for i, report in enumerate(reports) if report.error_stats]
-    return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
+    return tuple(None if isinstance(study, FailedStudy) else study for study in studies), None not in studies
 
 
 #: Above _WORTH_LOADING samples, loading kernels from disk is faster than interpreting.
@@ -243,7 +251,7 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
-def _should_compile(samples: int) -> bool:
+def _should_load_kernels(samples: int) -> bool:
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and all_kernels_on_disk())
 
 
@@ -252,25 +260,27 @@ class _Campaign:
     robot_inputs: Sequence[RobotInput]
     chunking: Chunking
     seed: int
-    memory: int | None
+    memory_limit: int | None
     collector: ResultCollector
     store: Store | None = None
 
-    def task(self, robot: int, index: int) -> Task:
-        return Task(robot, self.chunking.chunk(self.robot_inputs[robot], self.seed, index, self.memory))
+    def make_task(self, robot: int, index: int) -> Task:
+        return Task(
+            robot, self.chunking.make_chunk(self.robot_inputs[robot], self.seed, index, self.memory_limit)
+        )
 
     def load_answers(self, store: Store) -> None:
         for robot in range(len(self.robot_inputs)):
             for index in self.collector.missing_chunks(robot):
                 if (answer := store.read_answer(robot, index)) is not None:
-                    self.collector.add(self.task(robot, index), answer, from_earlier_run=True)
+                    self.collector.add(self.make_task(robot, index), answer, from_earlier_run=True)
         self.store = store
 
-    def work(self) -> Iterator[Iterator[Task]]:
-        return (self._tasks(robot) for robot in range(len(self.robot_inputs)))
+    def make_work(self) -> Iterator[Iterator[Task]]:
+        return (self._make_tasks(robot) for robot in range(len(self.robot_inputs)))
 
-    def _tasks(self, robot: int) -> Iterator[Task]:
-        return (self.task(robot, index) for index in self.collector.missing_chunks(robot))
+    def _make_tasks(self, robot: int) -> Iterator[Task]:
+        return (self.make_task(robot, index) for index in self.collector.missing_chunks(robot))
 
     def save(self, task: Task, answer: Answer) -> None:
         if self.store is not None and not (isinstance(answer, Failure) and answer.is_transient):
@@ -281,11 +291,14 @@ class _Campaign:
 def chunks_of_shard(robots: int, chunking: Chunking, shard: str | None = None) -> list[range]:
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
-    The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read by
-    one shard only.
+    The shards are contiguous ranges in the order of robots and chunks, so that most robots are read by one
+    shard only. The numbers of chunks of two shards differ by at most one.
 
     >>> chunks_of_shard(2, Chunking(1000), "1/4"), chunks_of_shard(2, Chunking(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
+
+    Raises:
+        InputError: `shard` does not have the form i/n with 1 <= i <= n.
     """
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", "1/1" if shard is None else shard)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
@@ -308,7 +321,7 @@ def _warn(message: str) -> None:
     warnings.warn(message, StoreWarning, stacklevel=2)
 
 
-def _engine(jobs: int, isolate: bool, executor: Executor | Engine | None) -> Engine:
+def _choose_engine(jobs: int, isolate: bool, executor: Executor | Engine | None) -> Engine:
     if executor is not None:
         return ExecutorEngine(executor) if isinstance(executor, Executor) else executor
     return ProcessEngine(jobs, isolate=isolate) if isolate or jobs > 1 else SerialEngine()

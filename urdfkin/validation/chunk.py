@@ -44,11 +44,10 @@ from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
-#: Minimum number of chunks of a robot with 200 or more samples.
-#: Several workers can then share the robot.
+#: Minimum number of chunks of a robot with 200 or more samples, so that several workers can share the robot.
 _MIN_CHUNKS = 8
 #: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
-#: A chunk of this size takes one second for a typical robot.
+#: A chunk of this size takes about half a second for a robot with seven joints.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -60,34 +59,34 @@ class Chunk:
     """A range of samples of one robot.
 
     Attributes:
-        first: Index of the first draw.
+        first_draw: Index of the first draw.
         samples: Number of random configurations.
-        memory: Allowed memory, bytes; None: half of the free memory.
+        memory_limit: Allowed memory, bytes; None: half of the free memory.
     """
 
     robot_input: RobotInput
     seed: int
     index: int
-    first: int
+    first_draw: int
     samples: int
-    memory: int | None = field(default=None, compare=False)
+    memory_limit: int | None = field(default=None, compare=False)
 
     @property
-    def configurations(self) -> int:
-        return self.samples + (SPECIAL_SAMPLES if self.first == 0 else 0)
+    def configuration_count(self) -> int:
+        return self.samples + (SPECIAL_SAMPLES if self.first_draw == 0 else 0)
 
     @property
     def first_sample(self) -> int:
-        return 0 if self.first == 0 else SPECIAL_SAMPLES + self.first * DRAW_SIZE
+        return 0 if self.first_draw == 0 else SPECIAL_SAMPLES + self.first_draw * DRAW_SIZE
 
     def draw(self, tree: KinematicTree) -> Samples:
-        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAW_SIZE)))]
-        return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
+        draws = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAW_SIZE)))]
+        return Samples(*(np.concatenate([getattr(x, name) for x in draws]) for name in ("q", "v", "a")))
 
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
-        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first_draw + i,)))
         samples = min(DRAW_SIZE, self.samples - i * DRAW_SIZE)
-        return draw_samples(tree, samples, rng, with_zero_and_limits=self.first + i == 0)
+        return draw_samples(tree, samples, rng, with_zero_and_limits=self.first_draw + i == 0)
 
 
 @dataclass(slots=True)
@@ -98,7 +97,7 @@ class Timings:
     urdfkin: float = 0.0
     pinocchio: float = 0.0
     compare: float = 0.0
-    second: float = 0.0
+    second_oracle: float = 0.0
 
     def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         begin = time.perf_counter()
@@ -108,21 +107,21 @@ class Timings:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
+        self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second_oracle)
 
     def __add__(self, other: Timings) -> Timings:
         return Timings(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def as_dict(self) -> dict[str, Any]:
         parts = {name: round(getattr(self, name), 4) for name in ("read", "urdfkin", "pinocchio", "compare")}
-        return parts | ({"second_oracle": round(self.second, 4)} if self.second else {})
+        return parts | ({"second_oracle": round(self.second_oracle, 4)} if self.second_oracle else {})
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
     """Result of one chunk, or the sum of several results.
 
-    Only the first chunk of a robot computes `summary`.
+    `summary` is None without the first chunk of the robot.
     """
 
     name: str
@@ -158,23 +157,25 @@ class Chunking:
     samples: int
 
     @property
-    def _draws(self) -> int:
+    def _draws_per_chunk(self) -> int:
         return min(_MAX_DRAWS, max(1, -(-self.samples // DRAW_SIZE) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
         """Number of chunks of a robot, at least one."""
-        return max(1, -(-self.samples // (self._draws * DRAW_SIZE)))
+        return max(1, -(-self.samples // (self._draws_per_chunk * DRAW_SIZE)))
 
-    def chunk(self, robot_input: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
-        first = index * self._draws
-        samples = min(self._draws * DRAW_SIZE, self.samples - first * DRAW_SIZE)
-        return Chunk(robot_input, seed, index, first, samples, most)
+    def make_chunk(
+        self, robot_input: RobotInput, seed: int, index: int, memory_limit: int | None = None
+    ) -> Chunk:
+        first_draw = index * self._draws_per_chunk
+        samples = min(self._draws_per_chunk * DRAW_SIZE, self.samples - first_draw * DRAW_SIZE)
+        return Chunk(robot_input, seed, index, first_draw, samples, memory_limit)
 
-    def configurations(self, chunks: range) -> int:
-        """Return the number of samples, including the special configurations."""
+    def count_configurations(self, chunks: range) -> int:
+        """Return the number of configurations in the chunks, including the special configurations."""
         if not chunks:
             return 0
-        size = self._draws * DRAW_SIZE
+        size = self._draws_per_chunk * DRAW_SIZE
         random = min(self.samples, chunks.stop * size) - chunks.start * size
         return random + (SPECIAL_SAMPLES if chunks.start == 0 else 0)
 
@@ -186,23 +187,25 @@ class SecondOracleModel:
 
     def cross_check(
         self,
-        block: _Block,
+        block: _FrameComparison,
         row: Quantity,
         reference: Reference | None,
         results: FloatArray,
         oracle_results: FloatArray,
     ) -> CrossCheck:
-        second = block.timings.time_call("second", row.ask_oracle, self.oracle, block.query(row, reference))
+        second_oracle_results = block.timings.time_call(
+            "second_oracle", row.ask_oracle, self.oracle, block.make_query(row, reference)
+        )
         bounds = (
-            row.bound(block.plan, size, reference)
-            for size in (block.size, self.library.adapt_magnitudes(block.size))
+            row.bound(block.plan, magnitudes, reference)
+            for magnitudes in (block.magnitudes, self.library.adapt_magnitudes(block.magnitudes))
         )
         if row.object_kind == "joints":
-            bounds = (block.joint_bound(one) for one in bounds)
-        return make_cross_check(self.library.name, results, oracle_results, second, *bounds)
+            bounds = (block.select_joint_bound(bound) for bound in bounds)
+        return make_cross_check(self.library.name, results, oracle_results, second_oracle_results, *bounds)
 
 
-def compare_frames(
+def compare_robot(
     robot: Robot,
     oracle: Oracle,
     x: Samples,
@@ -210,32 +213,35 @@ def compare_frames(
     timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, ErrorStats]:
-    """Return the error statistics of each quantity."""
-    found: dict[Key, ErrorStats] = {}
-    work = robot, oracle, x, first_sample, timings
+    """Return the error statistics of each quantity in each reference frame, for all frames and joints."""
+    error_stats: dict[Key, ErrorStats] = {}
+    arguments = robot, oracle, x, first_sample, timings
     for frames in memory.blocks(len(robot.all_frames), memory.frame_array_bytes(len(x.q), robot.nv)):
-        for key, part in _Block(*work, frames).compare(second):
-            found[key] = found[key].join_frames(part) if key in found else part
-    screws = reduce(ErrorStats.join_frames, _Screws(*work).compare())
-    return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
+        for key, part in _FrameComparison(*arguments, frames).compare(second):
+            error_stats[key] = error_stats[key].join_frames(part) if key in error_stats else part
+    screws = reduce(ErrorStats.join_frames, _ScrewComparison(*arguments).compare())
+    return error_stats | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
 
 
-class _ComparisonBatch:
+class _Comparison:
     def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings) -> None:
-        self.robot, self.oracle, self.x, self.first, self.timings = robot, oracle, x, first_sample, timings
+        self.robot, self.oracle, self.x, self.first_sample, self.timings = (
+            robot,
+            oracle,
+            x,
+            first_sample,
+            timings,
+        )
         self.inputs: list[Inputs] = list(zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True))
 
     def _compute_stats(
         self, results: FloatArray, oracle_results: FloatArray, bound: Bound, names: tuple[str, ...]
     ) -> ErrorStats:
-        return compute_error_stats(results, oracle_results, bound, names, self.first, self.inputs)
+        return compute_error_stats(results, oracle_results, bound, names, self.first_sample, self.inputs)
 
 
-class _Block(_ComparisonBatch):
-    """Comparison of a block of frames with the oracles.
-
-    A joint belongs to the block of its child link.
-    """
+class _FrameComparison(_Comparison):
+    """Comparison of a block of frames; a joint belongs to the block of its child link."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
@@ -247,7 +253,7 @@ class _Block(_ComparisonBatch):
         # The robot caches a compiled tree for all frames. A compiled tree for some frames is not cached.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
-        self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
+        self.magnitudes = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
         # A joint and its child link have the same Jacobian.
         # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -256,33 +262,32 @@ class _Block(_ComparisonBatch):
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Yield the key and error statistics of each quantity, for frames and for joints.
+        """Compare urdfkin's result for a link also with Pinocchio's result for the link's parent joint.
 
-        A joint and its child link have the same frame. Pinocchio has different functions for joints and
-        links, so urdfkin's result is compared with both.
+        Both have the same frame, but Pinocchio has different functions for joints and links.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():
             joints = [joint for joint in validated_quantities("joints") if joint.compute is row.compute]
             for reference in row.references:
                 results = self.timings.time_call("urdfkin", row.compute_results, self.plan, inputs, reference)
-                bound = row.bound(self.plan, self.size, reference)
-                yield self._compare(row, reference, results, bound, second)
+                bound = row.bound(self.plan, self.magnitudes, reference)
+                yield self._compare_quantity(row, reference, results, bound, second)
                 for joint in joints:
-                    own, joint_bound = results[:, self.joint_rows], self.joint_bound(bound)
-                    yield self._compare(joint, reference, own, joint_bound, second)
+                    joint_results, joint_bound = results[:, self.joint_rows], self.select_joint_bound(bound)
+                    yield self._compare_quantity(joint, reference, joint_results, joint_bound, second)
 
-    def joint_bound(self, bound: Bound) -> Bound:
+    def select_joint_bound(self, bound: Bound) -> Bound:
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
-    def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
+    def make_query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
         joints = row.object_kind == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
         return QueryBatch(frames, inputs, reference, frames_are_joints=joints, is_partial=True)
 
-    def _compare(
+    def _compare_quantity(
         self,
         row: Quantity,
         reference: Reference | None,
@@ -292,17 +297,17 @@ class _Block(_ComparisonBatch):
     ) -> tuple[Key, ErrorStats]:
         names = self.joint_names if row.object_kind == "joints" else self.frames
         oracle_results = self.timings.time_call(
-            "pinocchio", row.ask_oracle, self.oracle, self.query(row, reference)
+            "pinocchio", row.ask_oracle, self.oracle, self.make_query(row, reference)
         )
-        found = self._compute_stats(results, oracle_results, bound, names)
+        stats = self._compute_stats(results, oracle_results, bound, names)
         if second is not None:
-            found = replace(
-                found, cross_check=second.cross_check(self, row, reference, results, oracle_results)
+            stats = replace(
+                stats, cross_check=second.cross_check(self, row, reference, results, oracle_results)
             )
-        return (row.name, reference.name.lower() if reference is not None else ""), found
+        return (row.name, reference.name.lower() if reference is not None else ""), stats
 
 
-class _Screws(_ComparisonBatch):
+class _ScrewComparison(_Comparison):
     """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
     Each column of `data.J` belongs to one joint velocity, and is in WORLD.
@@ -320,34 +325,36 @@ class _Screws(_ComparisonBatch):
         for block in memory.blocks(len(moving), memory.frame_array_bytes(len(x.q), tree.nv)):
             joints = moving[block]
             width = sum(tree.joints[i].kind.nv for i in joints)
-            yield self._compare_block(tree, q_free, joints, oracle_results[:, column : column + width])
+            yield self._compare_joints(tree, q_free, joints, oracle_results[:, column : column + width])
             column += width
 
-    def _compare_block(
+    def _compare_joints(
         self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], oracle_results: FloatArray
     ) -> ErrorStats:
         links = [i + 1 for i in joints]
         plan = compile_tree(tree, links)
-        still = (np.zeros((len(q), tree.nv)),) * 2
-        size = compute_magnitudes(plan, q, *still, FIXED_BASE_STATE)
+        zeros = (np.zeros((len(q), tree.nv)),) * 2
+        magnitudes = compute_magnitudes(plan, q, *zeros, FIXED_BASE_STATE)
         J = self.timings.time_call("urdfkin", SCREWS.compute_results, plan, (q,), Reference.WORLD)
-        bound = SCREWS.bound(plan, size, Reference.WORLD)
-        own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
-        frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
+        bound = SCREWS.bound(plan, magnitudes, Reference.WORLD)
+        entries = [
+            (f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)
+        ]
+        frame, column = np.array(entries, dtype=np.int64).reshape(-1, 2).T
         results = J[:, frame, :, column].swapaxes(0, 1)
         scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
-        names = tuple(tree.joints[joints[f]].name for f, _ in own)
+        names = tuple(tree.joints[joints[f]].name for f, _ in entries)
         return self._compute_stats(results, oracle_results, Bound(scale, bound.k[:, frame, 0]), names)
 
 
-def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return q for the tree `free`, in which mimic joints are independent joints."""
-    expanded = np.empty((len(q), free.nq))
-    for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
-        own = q[:, at : at + joint.kind.nq]
+def _expand_mimic(tree: KinematicTree, free_tree: KinematicTree, q: FloatArray) -> FloatArray:
+    """Return q for the tree `free_tree`, in which mimic joints are independent joints."""
+    expanded = np.empty((len(q), free_tree.nq))
+    for joint, at, free_at in zip(tree.joints, tree.q_index, free_tree.q_index, strict=True):
+        values = q[:, at : at + joint.kind.nq]
         if joint.mimic:
-            own = joint.mimic.multiplier * own + joint.mimic.offset
-        expanded[:, free_at : free_at + joint.kind.nq] = own
+            values = joint.mimic.multiplier * values + joint.mimic.offset
+        expanded[:, free_at : free_at + joint.kind.nq] = values
     return expanded
 
 
@@ -357,16 +364,16 @@ _Models = tuple[Robot, Oracle, SecondOracleModel | None]
 _cache: dict[RobotInput, _Models] = {}
 
 
-def _load(chunk: Chunk) -> _Models:
+def _load_models(chunk: Chunk) -> _Models:
     if (models := _cache.get(chunk.robot_input)) is not None:
         return models
     _cache.clear()
     robot = chunk.robot_input.load()
-    most = memory.limit() if chunk.memory is None else chunk.memory
-    memory.check(robot.tree, chunk.samples + SPECIAL_SAMPLES, most)  # The first chunk is the largest.
+    memory_limit = memory.limit() if chunk.memory_limit is None else chunk.memory_limit
+    memory.check(robot.tree, chunk.samples + SPECIAL_SAMPLES, memory_limit)  # The first chunk is the largest.
     second = None
-    if (by := robot.verifier.library) is not PINOCCHIO:
-        second = SecondOracleModel(by, robot.verifier.oracle(library=by))
+    if (library := robot.verifier.library) is not PINOCCHIO:
+        second = SecondOracleModel(library, robot.verifier.oracle(library=library))
     models = robot, robot.verifier.oracle(), second
     _cache[chunk.robot_input] = models
     return models
@@ -374,18 +381,18 @@ def _load(chunk: Chunk) -> _Models:
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
     begin, timings = time.perf_counter(), Timings()
-    robot, oracle, second = _load(chunk)
+    robot, oracle, second = _load_models(chunk)
     summary = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
     timings.read = time.perf_counter() - begin
-    found = compare_frames(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
+    error_stats = compare_robot(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
     seconds = time.perf_counter() - begin
     timings.close(seconds)
     return ChunkResult(
         name=robot.name,
         joints=robot.joint_names,
         frames=robot.all_frames,
-        error_stats=found,
-        samples=chunk.configurations,
+        error_stats=error_stats,
+        samples=chunk.configuration_count,
         seconds=seconds,
         timings=timings,
         summary=summary,

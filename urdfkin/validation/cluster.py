@@ -38,19 +38,18 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: Maximum number of unanswered chunks: _PER_THREAD * threads + _MORE.
-#: `threads` is the sum over all workers.
+#: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * (threads of all workers) + _EXTRA_CHUNKS.
 #: Every thread then always has a next chunk.
-_PER_THREAD, _MORE = 2, 4
+_CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe: a chunk can crash a child process of a Dask worker, but not the Dask worker.
-_TRIES = 20
+_MAX_TRIES = 20
 #: Seconds after which the number of workers is read again.
-_INTERVAL = 1.0
+_REFRESH_SECONDS = 1.0
 #: The scheduler does not need these packages.
-#: If the scheduler has one of the packages, the package must have the same version as in this process.
+#: If the scheduler has one of the packages, its version must be the same as in this process.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
-_NO_ROBOT = RobotInput(b"", Origin(""))
+_EMPTY_ROBOT_INPUT = RobotInput(b"", Origin(""))
 
 
 class ClusterError(UrdfkinError, RuntimeError):
@@ -67,9 +66,11 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
         tell: Function that receives messages for the user.
 
     Raises:
-        ClusterError: no scheduler answers, a worker cannot run urdfkin, or versions or code differ.
+        ClusterError: No scheduler answers, a worker cannot run urdfkin, or versions or code differ. Dask
+            opens a port for local workers.
+        InputError: N in `local:N` is not a whole number, or is below one.
     """
-    with _client(scheduler) as client:
+    with _connect_client(scheduler) as client:
         _check_versions(client)
         threads = client.nthreads()
         dashboard = f"; dashboard: {client.dashboard_link}" if client.dashboard_link else ""
@@ -84,7 +85,7 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
 
 
 @contextmanager
-def _client(scheduler: str) -> Iterator[Client]:
+def _connect_client(scheduler: str) -> Iterator[Client]:
     kind, _, number = scheduler.partition(":")
     if kind != "local":
         try:
@@ -98,12 +99,12 @@ def _client(scheduler: str) -> Iterator[Client]:
         # Delete the failed client in the thread that created the client.
         # If another thread deleted the client, Dask would hang.
         gc.collect()
-        keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
+        key_hint = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
             "no Dask scheduler answers at this address",
             where=scheduler,
             found=found,
-            remedy="start a scheduler with: dask scheduler" + (keyed if kind == "tls" else ""),
+            remedy="start a scheduler with: dask scheduler" + (key_hint if kind == "tls" else ""),
         )
     if not number.isdecimal() or not int(number):
         raise InputError(
@@ -111,29 +112,26 @@ def _client(scheduler: str) -> Iterator[Client]:
             found=repr(scheduler),
             remedy="give local:2",
         )
-    with _without_ports(int(number)) as cluster, Client(cluster, set_as_default=False) as client:
+    with _start_local_cluster(int(number)) as cluster, Client(cluster, set_as_default=False) as client:
         yield client
 
 
-class _Portless:
-    """A scheduler or worker without Dask's web server.
-
-    Dask's web pages are readable by every user of the machine.
-    """
+class _WithoutWebServer:
+    """Scheduler or worker without Dask's web pages, which every user of the machine could read."""
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
 
 
-class _Scheduler(_Portless, Scheduler):
+class _LocalScheduler(_WithoutWebServer, Scheduler):
     pass
 
 
-class _ClusterWorker(_Portless, Worker):
+class _LocalWorker(_WithoutWebServer, Worker):
     pass
 
 
 @contextmanager
-def _without_ports(number: int) -> Iterator[SpecCluster]:
+def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process, without an open port.
 
     Dask adds its scratch folders to `sys.path`, so another user could place modules there. Only the current
@@ -146,8 +144,8 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
         with (
             dask.config.set({"temporary-directory": scratch}),
             SpecCluster(
-                scheduler={"cls": _Scheduler, "options": scheduler},
-                workers={i: {"cls": _ClusterWorker, "options": worker} for i in range(number)},
+                scheduler={"cls": _LocalScheduler, "options": scheduler},
+                workers={i: {"cls": _LocalWorker, "options": worker} for i in range(workers)},
                 silence_logs=logging.ERROR,
             ) as cluster,
         ):
@@ -166,10 +164,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError if library versions or urdfkin's code differ from this machine's.
-
-    Call this function before any robot or chunk is sent to the cluster.
-    """
+    """Raise ClusterError on a difference, before any robot or chunk is sent to the cluster."""
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
@@ -208,29 +203,28 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: Sent chunks without an answer.
-        #: Task of each chunk, and how often the chunk was sent.
+        #: For each sent chunk without an answer: its task, and how often the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: For each robot, a future of the text that describes the robot. The workers store this text.
-        self._robots: dict[int, Future[bytes]] = {}
-        #: Number of sent chunks without an answer, for each robot.
-        self._in_use = Counter[int]()
-        self._limit, self._counted = _MORE, float("-inf")
+        #: For each robot, the future of its text. The workers store this text.
+        self._robot_texts: dict[int, Future[bytes]] = {}
+        #: For each robot, the number of sent chunks without an answer.
+        self._pending_counts = Counter[int]()
+        self._limit, self._limit_time = _EXTRA_CHUNKS, float("-inf")
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
-        waiting, failed = chain.from_iterable(work), set[int]()
+        all_tasks, failed_robots = chain.from_iterable(work), set[int]()
         completed = as_completed(loop=self._client.loop)
         try:
             while True:
                 while (
-                    len(self._pending) < self._current_limit() and (task := next(waiting, None)) is not None
+                    len(self._pending) < self._update_limit() and (task := next(all_tasks, None)) is not None
                 ):
-                    if task.robot in failed:
+                    if task.robot in failed_robots:
                         continue
                     try:
                         completed.add(self._send(task, 1))
                     except (UrdfkinError, OSError) as error:  # The file cannot be read or has changed.
-                        failed.add(task.robot)
+                        failed_robots.add(task.robot)
                         on_answer(task, make_failure(task.chunk.robot_input, error))
                 if not self._pending:
                     return
@@ -241,53 +235,53 @@ class Cluster:
                     completed.add(self._send(task, tries + 1))
                 else:
                     if isinstance(answer, Failure):
-                        failed.add(task.robot)
+                        failed_robots.add(task.robot)
                     on_answer(task, answer)
-                self._forget(task.robot)
+                self._release_robot(task.robot)
         finally:
             if self._client.status == "running":
                 self._client.cancel(list(self._pending))
             self._pending.clear()
-            self._robots.clear()
+            self._robot_texts.clear()
 
-    def _current_limit(self) -> int:
-        if time.monotonic() - self._counted > _INTERVAL and self._client.status == "running":
+    def _update_limit(self) -> int:
+        if time.monotonic() - self._limit_time > _REFRESH_SECONDS and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
-            self._limit, self._counted = _PER_THREAD * threads + _MORE, time.monotonic()
+            self._limit, self._limit_time = _CHUNKS_PER_THREAD * threads + _EXTRA_CHUNKS, time.monotonic()
         return self._limit
 
     def _send(self, task: Task, tries: int) -> Future[Any]:
-        if (robot := self._robots.get(task.robot)) is None:
+        if (robot := self._robot_texts.get(task.robot)) is None:
             data = pickle.dumps(task.chunk.robot_input.with_text())
-            robot = self._robots[task.robot] = self._client.submit(remote.store_robot, data, pure=False)
-        chunk = pickle.dumps(replace(task.chunk, robot_input=_NO_ROBOT))
+            robot = self._robot_texts[task.robot] = self._client.submit(remote.store_robot, data, pure=False)
+        chunk = pickle.dumps(replace(task.chunk, robot_input=_EMPTY_ROBOT_INPUT))
         future = self._client.submit(remote.run, robot, chunk, provenance(), pure=False)
         self._pending[future] = task, tries
-        self._in_use[task.robot] += 1
+        self._pending_counts[task.robot] += 1
         return future
 
-    def _forget(self, robot: int) -> None:
+    def _release_robot(self, robot: int) -> None:
         """If no chunk of the robot is pending, delete its text on the workers."""
-        self._in_use[robot] -= 1
-        if not self._in_use[robot]:
-            del self._in_use[robot]
-            self._robots.pop(robot, None)
+        self._pending_counts[robot] -= 1
+        if not self._pending_counts[robot]:
+            del self._pending_counts[robot]
+            self._robot_texts.pop(robot, None)
 
     def _take_answer(self, future: Future[Any], task: Task, tries: int) -> Answer | None:
         """Return the answer; None if the chunk must be sent again."""
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as lost:  # The connection to the scheduler is lost.
-                raise self._make_lost_error() from lost
-            return _answer(result, task)
+            except OSError as lost_error:  # The connection to the scheduler is lost.
+                raise self._make_lost_error() from lost_error
+            return _as_answer(result, task)
         if self._client.status != "running":
             raise self._make_lost_error()
         error = future.exception() if future.status == "error" else None
-        if tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
+        if tries < _MAX_TRIES and (error is None or isinstance(error, KilledWorker)):
             return None
-        known = error if isinstance(error, Exception) else RuntimeError(future.status)
-        return make_lost_failure("the cluster lost the chunk", known)
+        cause = error if isinstance(error, Exception) else RuntimeError(future.status)
+        return make_lost_failure("the cluster lost the chunk", cause)
 
     def _make_lost_error(self) -> ClusterError:
         return ClusterError(
@@ -297,7 +291,7 @@ class Cluster:
         )
 
 
-def _answer(outcome: remote.ChunkOutcome, task: Task) -> Answer:
+def _as_answer(outcome: remote.ChunkOutcome, task: Task) -> Answer:
     if outcome[0] == "died":
         return make_crash_failure(task.chunk.robot_input, CRASHED_TWICE, outcome[1])
     if outcome[0] == "other code":

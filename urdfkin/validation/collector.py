@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-The results of consecutive chunks are stored as one sum, to save memory. The sum does not depend on the order
-in which the results arrive.
+The results of consecutive chunks are stored as one sum, to save memory. The error statistics in the sum do
+not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
+        label: Name of the robot of the latest chunk; before the work, of the first robot.
     """
 
     robots_done: int
@@ -49,41 +50,41 @@ class ResultCollector:
     """Collect the answers of a run for each robot.
 
     Args:
-        parts: Range of chunks to run, for each robot.
+        chunk_ranges: Range of chunks to run, for each robot.
     """
 
     def __init__(
         self,
         robot_inputs: Sequence[RobotInput],
         chunking: Chunking,
-        parts: Sequence[range],
+        chunk_ranges: Sequence[range],
         progress: Progress | None = None,
     ) -> None:
         self._robot_inputs, self._chunking, self._progress = robot_inputs, chunking, progress
-        self._robots = [_RobotAnswers(part) for part in parts]
-        self._chunks = sum(map(len, parts))
+        self._robots = [_RobotAnswers(chunks) for chunks in chunk_ranges]
+        self._chunks = sum(map(len, chunk_ranges))
         self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
     def begin(self) -> None:
         if self._progress is not None:
-            self._progress(self.state(self._robot_inputs[0].label if self._robot_inputs else ""))
+            self._progress(self.make_progress(self._robot_inputs[0].label if self._robot_inputs else ""))
 
     def add(self, task: Task, answer: Answer, *, from_earlier_run: bool = False) -> None:
         """Add an answer, and report the progress."""
         robot = self._robots[task.robot]
-        was_complete, had_failed, before = robot.is_complete, robot.has_failed, robot.done
+        was_complete, had_problem, before = robot.is_complete, robot.has_problem, robot.chunks_done
         robot.add(task.chunk.index, answer)
-        self._chunks_done += robot.done - before
-        self._from_earlier += from_earlier_run * (robot.done - before)
+        self._chunks_done += robot.chunks_done - before
+        self._from_earlier += from_earlier_run * (robot.chunks_done - before)
         self._robots_done += robot.is_complete and not was_complete
-        self._failures += robot.has_failed and not had_failed
+        self._failures += robot.has_problem and not had_problem
         if self._progress is not None:
-            self._progress(self.state(self._robot_inputs[task.robot].label))
+            self._progress(self.make_progress(self._robot_inputs[task.robot].label))
 
-    def state(self, label: str = "") -> CampaignProgress:
+    def make_progress(self, label: str = "") -> CampaignProgress:
         return CampaignProgress(
             robots_done=self._robots_done,
-            robots=sum(bool(robot.part) for robot in self._robots),
+            robots=sum(bool(robot.chunks) for robot in self._robots),
             chunks_done=self._chunks_done,
             chunks=self._chunks,
             chunks_from_earlier_run=self._from_earlier,
@@ -92,11 +93,11 @@ class ResultCollector:
         )
 
     def missing_chunks(self, robot: int) -> Iterator[int]:
-        known = self._robots[robot]
-        for index in known.part:
-            if known.failures:
+        robot_answers = self._robots[robot]
+        for index in robot_answers.chunks:
+            if robot_answers.failures:
                 return
-            if index not in known:
+            if index not in robot_answers:
                 yield index
 
     def fail_unfinished(self, failure: Failure) -> None:
@@ -104,15 +105,15 @@ class ResultCollector:
             if not robot.is_complete:
                 robot.failures[len(self._chunking)] = failure
 
-    def reports(self) -> Iterator[RobotReport]:
+    def make_reports(self) -> Iterator[RobotReport]:
         for robot_input, robot in zip(self._robot_inputs, self._robots, strict=True):
-            if robot.part:
-                yield robot.report(robot_input, self._chunking.configurations(robot.part))
+            if robot.chunks:
+                yield robot.make_report(robot_input, self._chunking.count_configurations(robot.chunks))
 
 
 class _RobotAnswers:
-    def __init__(self, part: range) -> None:
-        self.part = part
+    def __init__(self, chunks: range) -> None:
+        self.chunks = chunks
         self.failures: dict[int, Failure] = {}
         #: The sum of the results for each range of chunks.
         #: The ranges are disjoint and in ascending order.
@@ -123,7 +124,10 @@ class _RobotAnswers:
         if isinstance(answer, Failure):
             self.failures[index] = answer
         else:
-            self._has_disagreed = self._has_disagreed or any(_outside(answer.error_stats))
+            summary = answer.summary or EMPTY_SUMMARY
+            self._has_disagreed = self._has_disagreed or any(
+                _describe_disagreements(answer.error_stats, summary)
+            )
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
@@ -141,22 +145,22 @@ class _RobotAnswers:
         return index in self.failures or any(index in run for run, _ in self._sums)
 
     @property
-    def has_failed(self) -> bool:
+    def has_problem(self) -> bool:
         return self._has_disagreed or bool(self.failures)
 
     @property
-    def done(self) -> int:
+    def chunks_done(self) -> int:
         """Number of chunks that are finished or no longer needed."""
-        return len(self.part) if self.failures else sum(len(run) for run, _ in self._sums)
+        return len(self.chunks) if self.failures else sum(len(run) for run, _ in self._sums)
 
     @property
     def is_complete(self) -> bool:
-        return self.done == len(self.part)
+        return self.chunks_done == len(self.chunks)
 
-    def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
+    def make_report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
         # The report contains only results of chunks before the first failed chunk.
         # The speed of the workers determines which later chunks are finished.
-        last = min(self.failures, default=self.part.stop)
+        last = min(self.failures, default=self.chunks.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]
         result = reduce(add, results) if results else None
@@ -165,7 +169,7 @@ class _RobotAnswers:
         if failure is not None and summary is EMPTY_SUMMARY:
             summary = failure.summary
         samples = result.samples if result else 0
-        verdict, reasons = _verdict(error_stats, summary, failure, samples, requested_samples)
+        verdict, reasons = _decide_verdict(error_stats, summary, failure, samples, requested_samples)
         name = result.name if result else summary.model["name"] if summary.model else robot_input.label
         return RobotReport(
             origin=robot_input.origin,
@@ -183,18 +187,15 @@ class _RobotAnswers:
         )
 
 
-def _verdict(
+def _decide_verdict(
     error_stats: dict[Key, ErrorStats],
     summary: RobotSummary,
     failure: Failure | None,
     samples: int,
     requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
-    """Return the verdict on a robot and its reasons.
-
-    A disagreement takes precedence over a failure.
-    """
-    disagreements = [*_outside(error_stats), *summary.disagreements]
+    """A disagreement takes precedence over a failure."""
+    disagreements = list(_describe_disagreements(error_stats, summary))
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
         verdict, reasons = failure.verdict, [failure.reason]
@@ -206,17 +207,18 @@ def _verdict(
     return (ValidationVerdict.DISAGREES if disagreements else verdict), disagreements + reasons
 
 
-def _outside(error_stats: dict[Key, ErrorStats]) -> Iterator[str]:
+def _describe_disagreements(error_stats: dict[Key, ErrorStats], summary: RobotSummary) -> Iterator[str]:
     failed = sum(stats.failed for stats in error_stats.values())
     if failed:
         results = sum(stats.results for stats in error_stats.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
-    found = reduce(add_cross_checks, (stats.cross_check for stats in error_stats.values()), None)
-    if found is not None and found.urdfkin.failed:
-        ours, theirs, second_oracle = found.alone
-        title = ORACLES[found.by].title
-        words = "result of urdfkin disagrees" if found.urdfkin.failed == 1 else "results of urdfkin disagree"
+    total = reduce(add_cross_checks, (stats.cross_check for stats in error_stats.values()), None)
+    if total is not None and total.urdfkin.failed:
+        urdfkin, pinocchio, second = total.alone
+        title = ORACLES[total.by].title
+        words = "result of urdfkin disagrees" if total.urdfkin.failed == 1 else "results of urdfkin disagree"
         yield (
-            f"{found.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
-            f" the two others: urdfkin {ours:,}, Pinocchio {theirs:,}, {title} {second_oracle:,})"
+            f"{total.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
+            f" the two others: urdfkin {urdfkin:,}, Pinocchio {pinocchio:,}, {title} {second:,})"
         )
+    yield from summary.disagreements

@@ -23,10 +23,12 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_UNDEFINED = "null: a result is NaN, or two values with the bound 0 differ."
-Units = Annotated[NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
+_NULL_MEANING = "null: a result is NaN, or two values with the bound 0 differ."
+Units = Annotated[
+    NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
+]
 BoundRatio = Annotated[
-    float | None, doc(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
+    float | None, doc(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_NULL_MEANING}")
 ]
 ReferenceName = Literal["local", "world", "local_world_aligned"]
 
@@ -326,7 +328,7 @@ class ReportedCheck(TypedDict):
     bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        doc("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
+        doc("Smallest and largest bound of the results, in eps * scale; null and 0: nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],
@@ -352,10 +354,10 @@ class ReportedCheck(TypedDict):
 class ReportedTimings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
-    read: Annotated[
-        float, doc("Time of reading the file, of building the models and tables, and of any compilation.")
+    read: Annotated[float, doc("Time of reading the file, and of building the models and tables.")]
+    urdfkin: Annotated[
+        float, doc("Time of computing with urdfkin, and of loading or compiling its kernels in this time.")
     ]
-    urdfkin: Annotated[float, doc("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
     compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
     second_oracle: NotRequired[
@@ -387,7 +389,7 @@ class ReportedRobot(TypedDict):
     """Report of one robot."""
 
     source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
-    name: Annotated[str, doc("The robot's name in its file; the source if the file could not be read.")]
+    name: Annotated[str, doc("The robot's name in its file; the source if the name is unknown.")]
     verdict: Annotated[
         Literal["verified", "disagrees", "not verified", "bad input"], doc("Verdict on the robot.")
     ]
@@ -402,7 +404,13 @@ class ReportedRobot(TypedDict):
     timings: Annotated[
         ReportedTimings | None, doc("Computing times of the parts of the validation; null: unknown.")
     ]
-    model: Annotated[ReportedModel | None, doc("Links and joints; null: the file could not be read.")]
+    model: Annotated[
+        ReportedModel | None,
+        doc(
+            "Links and joints. null: the file could not be read, or the robot's first chunk has no result."
+            " Then there are also no chains."
+        ),
+    ]
     findings: Annotated[list[ReportedFinding], doc("Findings of the linter in the robot's file.")]
     chains: Annotated[list[Chain], doc("Chains of the robot with their Denavit-Hartenberg tables.")]
     second_reader: Annotated[
@@ -428,8 +436,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds. In a report that `urdfkin report DIR` makes from a"
-            " store: the sum of the robots' computing times."
+            "Wall time of the validation in seconds, without compilation before the first chunk. In a report"
+            " that `urdfkin report DIR` makes from a store: the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]
@@ -458,20 +466,20 @@ class ValidationVerdict(StrEnum):
     VERIFIED = "verified"
 
 
-DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
+EXIT_DISAGREES, EXIT_BAD_INPUT, EXIT_NOT_VERIFIED = 1, 2, 3
 #: Exit code of an interrupted run, as in shells: 128 + SIGINT.
-INTERRUPTED = 130
-_WORDS = {
+EXIT_INTERRUPTED = 130
+_VERDICT_WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),
     ValidationVerdict.NOT_VERIFIED: ("is not verified", "are not verified"),
     ValidationVerdict.BAD_INPUT: ("has bad input", "have bad input"),
 }
 OUTCOMES = {
     0: ValidationVerdict.VERIFIED.value,
-    DISAGREEMENT: ValidationVerdict.DISAGREES.value,
-    INTERRUPTED: "interrupted",
-    INPUT: ValidationVerdict.BAD_INPUT.value,
-    UNCHECKED: ValidationVerdict.NOT_VERIFIED.value,
+    EXIT_DISAGREES: ValidationVerdict.DISAGREES.value,
+    EXIT_INTERRUPTED: "interrupted",
+    EXIT_BAD_INPUT: ValidationVerdict.BAD_INPUT.value,
+    EXIT_NOT_VERIFIED: ValidationVerdict.NOT_VERIFIED.value,
 }
 
 
@@ -509,7 +517,7 @@ def outcome(verdicts: Iterable[str], robots_requested: int, interrupted: bool) -
     reasons = ["the validation was interrupted before everything was compared"] if interrupted else []
     reasons += [
         f"{counts[verdict]} of {robots} {words[counts[verdict] > 1]}"
-        for verdict, words in _WORDS.items()
+        for verdict, words in _VERDICT_WORDS.items()
         if counts[verdict]
     ]
     if missing := robots_requested - counts.total():
@@ -521,12 +529,12 @@ def outcome(verdicts: Iterable[str], robots_requested: int, interrupted: bool) -
 
 def _exit_code(counts: Counter[str], interrupted: bool, failed: bool) -> int:
     if counts[ValidationVerdict.DISAGREES]:
-        return DISAGREEMENT
+        return EXIT_DISAGREES
     if interrupted:
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     if counts[ValidationVerdict.BAD_INPUT]:
-        return INPUT
-    return UNCHECKED if failed else 0
+        return EXIT_BAD_INPUT
+    return EXIT_NOT_VERIFIED if failed else 0
 
 
 VALIDATION = DocumentKind(

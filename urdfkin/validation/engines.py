@@ -3,10 +3,11 @@
 An engine runs tasks, and passes the answer of each task to a callback. The order of the answers does not
 matter: the collector sorts the answers, so no result depends on the engine. If the answer of a chunk is a
 `Failure`, an engine may skip the remaining chunks of the same robot. The engine must run all other chunks.
-Tasks are created only when they are needed, so a million tasks take no memory.
+Tasks are created only when they are needed, so a million tasks take little memory.
 
 `WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker.
-If no robot is waiting, a free worker takes chunks of the robot whose latest chunk has the lowest index.
+If no robot is waiting, a free worker takes chunks of the least advanced robot: the index of its latest chunk
+is the lowest.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of submitted chunks whose answers the engine has not yet taken.
-IN_FLIGHT = 512
+#: Maximum number of chunks in the executor: submitted, and without an answer that the engine has taken.
+MAX_IN_FLIGHT = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +41,8 @@ AnswerCallback = Callable[[Task, Answer], None]
 class Engine(Protocol):
     """Interface of an engine.
 
-    If `Engine.run` raises an exception, `validate` runs no further task and returns a report. The answers of
-    finished tasks are kept.
+    If `Engine.run` raises an exception, `validate` runs no further task. Its report contains the answers that
+    the callback has received.
     """
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None: ...
@@ -63,37 +64,37 @@ class ExecutorEngine:
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks; an error of the executor is reported as a failure."""
-        waiting, failed = chain.from_iterable(work), set[int]()
-        submitted = deque[tuple[Task, Future[Answer]]]()
-        next_task = next(waiting, None)
+        all_tasks, failed_robots = chain.from_iterable(work), set[int]()
+        pending = deque[tuple[Task, Future[Answer]]]()
+        next_task = next(all_tasks, None)
         try:
-            while next_task is not None or submitted:
+            while next_task is not None or pending:
                 answer: Answer | None
-                if next_task is not None and len(submitted) < IN_FLIGHT:
-                    task, next_task = next_task, next(waiting, None)
-                    if task.robot in failed:
+                if next_task is not None and len(pending) < MAX_IN_FLIGHT:
+                    task, next_task = next_task, next(all_tasks, None)
+                    if task.robot in failed_robots:
                         continue
-                    answer = self._submit(task, submitted)
+                    answer = self._submit(task, pending)
                 else:
-                    task, future = submitted.popleft()
-                    answer = _result(future)
+                    task, future = pending.popleft()
+                    answer = _take_answer(future)
                 if isinstance(answer, Failure):
-                    failed.add(task.robot)
+                    failed_robots.add(task.robot)
                 if answer is not None:
                     on_answer(task, answer)
         finally:
-            for _, future in submitted:
+            for _, future in pending:
                 future.cancel()
 
-    def _submit(self, task: Task, submitted: deque[tuple[Task, Future[Answer]]]) -> Failure | None:
+    def _submit(self, task: Task, pending: deque[tuple[Task, Future[Answer]]]) -> Failure | None:
         try:
-            submitted.append((task, self._executor.submit(answer_chunk, task.chunk)))
+            pending.append((task, self._executor.submit(answer_chunk, task.chunk)))
         except Exception as error:
             return make_lost_failure("the executor did not accept the task of checking the chunk", error)
         return None
 
 
-def _result(future: Future[Answer]) -> Answer:
+def _take_answer(future: Future[Answer]) -> Answer:
     try:
         return future.result()
     except Exception as error:
@@ -127,16 +128,16 @@ class RobotTasks:
 class WorkQueue:
     """Distribute tasks among workers.
 
-    If `shared` is true, several workers may validate the same robot.
+    If `share_robots` is true, several workers may validate the same robot.
     """
 
-    def __init__(self, work: Work, *, shared: bool = True) -> None:
+    def __init__(self, work: Work, *, share_robots: bool = True) -> None:
         self._waiting: Iterator[RobotTasks] = map(RobotTasks, work)
-        self._shared = shared
+        self._share_robots = share_robots
         self._started_robots: list[RobotTasks] = []
         self._removed_robots = set[int]()
 
-    def first(self) -> tuple[Task, RobotTasks] | None:
+    def take_for_idle_worker(self) -> tuple[Task, RobotTasks] | None:
         """Return a task for an idle worker; None if there is none.
 
         Robots that no worker has started come first.
@@ -145,7 +146,9 @@ class WorkQueue:
             self._started_robots.append(tasks)
             if (task := self.next(tasks)) is not None:
                 return task, tasks
-        for tasks in sorted(self._started_robots, key=lambda tasks: tasks.index) if self._shared else ():
+        for tasks in (
+            sorted(self._started_robots, key=lambda tasks: tasks.index) if self._share_robots else ()
+        ):
             if (task := self.next(tasks)) is not None:
                 return task, tasks
         return None
@@ -170,6 +173,6 @@ class WorkQueue:
     def remove(self, robot: int) -> None:
         self._removed_robots.add(robot)
 
-    def withdraw(self, robot: int) -> list[Task]:
+    def take_remaining_tasks(self, robot: int) -> list[Task]:
         self.remove(robot)
         return [task for tasks in self._started_robots if tasks.robot == robot for task in tasks]

@@ -24,7 +24,7 @@ from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_disagreements
 
 #: The libraries of a cross check, in the order of columns.
-CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
+CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class CrossCheck:
 
     Attributes:
         by: Name of the second oracle.
-        alone: For each library in `CROSS_CHECKED`, the number of results in which only this library differs.
+        alone: Number of results in which only one library differs, for each of `CROSS_CHECKED_LIBRARIES`.
     """
 
     by: str
@@ -73,7 +73,7 @@ class CrossCheck:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        return asdict(self) | {"alone": dict(zip(CROSS_CHECKED, self.alone, strict=True))}
+        return asdict(self) | {"alone": dict(zip(CROSS_CHECKED_LIBRARIES, self.alone, strict=True))}
 
 
 def add_cross_checks(first: CrossCheck | None, second: CrossCheck | None) -> CrossCheck | None:
@@ -85,50 +85,55 @@ def make_cross_check(
     results: FloatArray,
     pinocchio_results: FloatArray,
     second_oracle_results: FloatArray,
-    first: Bound,
-    second: Bound,
+    pinocchio_bound: Bound,
+    second_oracle_bound: Bound,
 ) -> CrossCheck:
     """Compare urdfkin, Pinocchio and the second oracle in pairs.
 
-    The results have the shape (n, frames, ...). `first` bounds the difference between urdfkin and Pinocchio.
-    `second` bounds the difference between urdfkin and the second oracle.
+    The results have the shape (n, frames, ...). The two bounds are for the differences between urdfkin and
+    Pinocchio, and between urdfkin and the second oracle.
     """
     if not results.size:
         return CrossCheck(by, OraclePair(), OraclePair())
-    agrees_with_pinocchio, _ = _compare_pair(results, pinocchio_results, first)
-    agrees_with_second, urdfkin = _compare_pair(results, second_oracle_results, second)
+    agrees_with_pinocchio, _ = _compare_pair(results, pinocchio_results, pinocchio_bound)
+    agrees_with_second, urdfkin = _compare_pair(results, second_oracle_results, second_oracle_bound)
     pinocchio_agrees_with_second, pinocchio = _compare_pair(
-        pinocchio_results, second_oracle_results, _sum_of_bounds(first, second)
+        pinocchio_results, second_oracle_results, _sum_of_bounds(pinocchio_bound, second_oracle_bound)
     )
     alone = (
         pinocchio_agrees_with_second & ~agrees_with_pinocchio & ~agrees_with_second,
         agrees_with_second & ~agrees_with_pinocchio & ~pinocchio_agrees_with_second,
         agrees_with_pinocchio & ~agrees_with_second & ~pinocchio_agrees_with_second,
     )
-    settled = np.logical_or.reduce(
+    is_decided = np.logical_or.reduce(
         (*alone, agrees_with_pinocchio & agrees_with_second & pinocchio_agrees_with_second)
     )
-    first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
-    counts = first_alone, second_alone, third_alone
-    return CrossCheck(by, urdfkin, pinocchio, counts, int((~settled).sum()))
+    urdfkin_alone, pinocchio_alone, second_oracle_alone = (int(one.sum()) for one in alone)
+    counts = urdfkin_alone, pinocchio_alone, second_oracle_alone
+    return CrossCheck(by, urdfkin, pinocchio, counts, int((~is_decided).sum()))
 
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
     units = worst_disagreements(one, other, bound.scale, 2)
-    bound_ratio = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
+    bound_ratio = _nan_as_infinity(units / result_k(bound, units.shape))
     agrees = bound_ratio <= 1.0
     return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(bound_ratio.max()))
 
 
+def _nan_as_infinity(ratios: FloatArray) -> FloatArray:
+    # A ratio is NaN if the bound is invalid: no result is within such a bound.
+    return np.where(np.isnan(ratios), np.inf, ratios)
+
+
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    size = first.k * first.scale + second.k * second.scale
+    total = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
-        return Bound(size / second.k, second.k)
+        return Bound(total / second.k, second.k)
 
 
 #: Edges of the histogram, in eps * scale: ten bins per decade.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
-#: Key of error statistics: the quantity and the reference frame.
+#: Key of error statistics: the quantity, and the reference frame ("" if there is none).
 Key = tuple[str, str]
 Inputs = tuple[list[float], list[float], list[float]]
 
@@ -202,7 +207,11 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile; below the last edge, the error is at most a bin's width."""
+    """Return the upper edge of the percentile's bin, but at most `worst`; 0.0 for the first bin.
+
+    The error is at most the width of the bin. The result for the last bin, which has no upper edge, is the
+    last edge.
+    """
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -224,7 +233,9 @@ def compute_error_stats(
 ) -> ErrorStats:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    `inputs` contains q, v and a of each sample.
+    `frames` are the names of the frames, joints or columns. `first_sample` is the index of the first sample
+    within the robot. `inputs` contains q, v and a of each sample. If the factor k of the bound is not finite
+    or not positive, no result is within the bound.
     """
     n, count = results.shape[:2]
     if not results.size:
@@ -232,7 +243,7 @@ def compute_error_stats(
             n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None
         )
     units = worst_disagreements(results, oracle_results, bound.scale, 2)
-    bound_ratio = units / result_k(bound, units.shape)
+    bound_ratio = _nan_as_infinity(units / result_k(bound, units.shape))
     k, f = divmod(int(bound_ratio.argmax()), count)
     q, v, a = inputs[k]
     case = WorstCase(

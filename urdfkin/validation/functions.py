@@ -28,7 +28,7 @@ from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import as_json_data
-from urdfkin.validation.diagnosis import Diagnosis, Mistakes, as_tuple, diagnose
+from urdfkin.validation.diagnosis import DiagnosisCase, Mistakes, as_tuple, diagnose
 from urdfkin.verify.bounds import result_k
 from urdfkin.verify.comparison import disagreement
 from urdfkin.verify.oracles import versions
@@ -603,7 +603,7 @@ class _Run:
         mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
         first = slice(_DIAGNOSIS_SAMPLES)
         inputs = tuple(x[first_batch.valid_indices[first]] for x in first_batch.inputs)
-        case = Diagnosis(
+        case = DiagnosisCase(
             inputs,
             first_batch.actual[first],
             first_batch.expected[first],

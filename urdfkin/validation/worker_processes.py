@@ -164,7 +164,7 @@ class _WorkerPool:
         self, work: Work, jobs: int, on_answer: AnswerCallback, *, crash_reason: str | None = None
     ) -> None:
         self._jobs, self._on_answer, self._crash_reason = jobs, on_answer, crash_reason
-        self._queue = WorkQueue(work, shared=crash_reason is None)
+        self._queue = WorkQueue(work, share_robots=crash_reason is None)
         self._workers: list[_PoolWorker] = []
         #: The unfinished tasks of each robot that crashed a process.
         #: These tasks run after the tasks of all other robots.
@@ -189,7 +189,7 @@ class _WorkerPool:
             worker = next((worker for worker in self._workers if worker.task is None), None)
             if worker is None and len(self._workers) >= self._jobs:
                 return
-            if (found := self._queue.first()) is None:
+            if (found := self._queue.take_for_idle_worker()) is None:
                 return
             task, tasks = found
             try:
@@ -238,7 +238,9 @@ class _WorkerPool:
         self._workers.remove(worker)
         cause = worker.wait_for_cause()
         if self._crash_reason is None:
-            self.to_retry.setdefault(task.robot, []).extend([task, *self._queue.withdraw(task.robot)])
+            self.to_retry.setdefault(task.robot, []).extend(
+                [task, *self._queue.take_remaining_tasks(task.robot)]
+            )
         else:
             self._record_answer(task, make_crash_failure(task.chunk.robot_input, self._crash_reason, cause))
 
