@@ -232,7 +232,9 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
     seconds = []
     for robot in begun[:: max(1, len(begun) // _MAX_TIMED_CHUNKS)][:_MAX_TIMED_CHUNKS]:
         answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
-        seconds += [next(answer.seconds for answer in answers if isinstance(answer, ChunkResult))]
+        # A damaged file is counted in `counts`, but has no result.
+        if (one := next((x.seconds for x in answers if isinstance(x, ChunkResult)), None)) is not None:
+            seconds.append(one)
     return sum(seconds) / len(seconds) if seconds else None
 
 
