@@ -428,7 +428,8 @@ def _replay_command(x: Inputs, k: int, form: str) -> str:
     return f"{line} --as {form}"
 
 
-#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
+#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES` in small letters.
+#: The import of that module would slow --help down.
 _EULER_SEQUENCES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = (
     "rpy",
