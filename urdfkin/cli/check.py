@@ -65,8 +65,8 @@ class CheckOutcome:
     Attributes:
         silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
             comment.
-        excerpts: Excerpt of the file for each finding. An excerpt has the faulty line, and a line with carets
-            below the fault.
+        excerpts: Excerpt of the file for each finding; None if the finding marks no text. An excerpt has the
+            faulty line, and a line with carets below the fault.
         known_count: Number of findings that the baseline file suppresses.
         obsolete_count: Number of findings that the baseline file lists, but that the checked files no longer
             have.

@@ -152,7 +152,7 @@ def _format_samples(
 
 _ROBOT_HELP = (
     "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may"
-    " also be a Denavit-Hartenberg table: .toml, .json or .csv."
+    " also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
 )
 _breakdown_option = click.option(
     "--breakdown",
@@ -382,7 +382,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
     rotation as T.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may
-    also be a Denavit-Hartenberg table: .toml, .json or .csv.
+    also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")

@@ -1,4 +1,4 @@
-"""Start viser's web server so that only this user's browser can use it, and open its page.
+"""Start viser's web server, refuse requests without the viewer's key, and open the viewer's page.
 
 A web server on 127.0.0.1 can be reached by every page in the user's browser and by every user of the machine.
 Four independent measures protect the viewer:
