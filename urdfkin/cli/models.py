@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: --recheck, and options of `urdfkin same` that affect only a new comparison.
+#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck itself.
 #: With --recheck, the other options of this tuple are errors.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
 #: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.

@@ -73,7 +73,7 @@ def style(**more: Any) -> Any:
 
 
 def label(name: str) -> str:
-    """Return a name for a drawing, with escapes for unprintable characters, some of which XML forbids."""
+    """Escape unprintable characters in a name for a drawing; XML forbids some unprintable characters."""
     return escape_unprintable(name)
 
 
