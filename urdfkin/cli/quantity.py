@@ -152,7 +152,7 @@ def _format_samples(
 
 _ROBOT_HELP = (
     "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may"
-    " also be a Denavit-Hartenberg table: .toml, .json or .csv."
+    " also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
 )
 _breakdown_option = click.option(
     "--breakdown",
@@ -382,7 +382,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
     rotation as T.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may
-    also be a Denavit-Hartenberg table: .toml, .json or .csv.
+    also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
@@ -428,7 +428,8 @@ def _replay_command(x: Inputs, k: int, form: str) -> str:
     return f"{line} --as {form}"
 
 
-#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
+#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES` in small letters.
+#: The import of that module would slow --help down.
 _EULER_SEQUENCES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = (
     "rpy",

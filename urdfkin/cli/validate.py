@@ -302,10 +302,7 @@ def _list_urdf_files(robot: str) -> list[str]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load the robot from standard input if `source` is "-"; otherwise return `source`.
-
-    Standard input can be read only once.
-    """
+    """Load the robot now if `source` is standard input, which can be read only once."""
     from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source
