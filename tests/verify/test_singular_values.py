@@ -22,7 +22,12 @@ from urdfkin.robot import Robot
 from urdfkin.verify.exact.numbers import precision, read_exact_joints
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.quantities import JACOBIAN
-from urdfkin.verify.singular_values import BoundedArray, SingularValues, _orthogonality_error, singular_values
+from urdfkin.verify.singular_values import (
+    BoundedArray,
+    SingularValues,
+    _bound_orthogonality_error,
+    singular_values,
+)
 from urdfkin.verify.singularity import FrameJacobian, Singularity
 
 exact = np.vectorize(mp.mpf, otypes=[object])
@@ -209,7 +214,9 @@ def test_bounds_of_singular_values_include_underflow_of_products(monkeypatch: py
 
 def test_the_measure_of_orthogonality_includes_the_rounding_of_the_product() -> None:
     # Each number of the product of 3 by 3 matrices has the error bound 5 eps.
-    assert _orthogonality_error(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
+    assert _bound_orthogonality_error(np.eye(3)) == pytest.approx(
+        5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0
+    )
 
 
 def test_bounds_of_singular_values_and_products_are_rounded_outward() -> None:

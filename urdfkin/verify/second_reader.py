@@ -80,9 +80,9 @@ def compare_with_yourdfpy(
     try:
         robot = read_with_yourdfpy(text)
     except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
-        words = " ".join(str(error).split()) or "no message"
+        message = " ".join(str(error).split()) or "no message"
         return SecondReading(
-            by, unread=escape_unprintable(f"{type(error).__name__}: {words}")[:_MAX_QUOTE_LENGTH]
+            by, unread=escape_unprintable(f"{type(error).__name__}: {message}")[:_MAX_QUOTE_LENGTH]
         )
     ours = {
         joint.name: (joint.original, tree.links[joint.parent], tree.links[i + 1])
@@ -152,8 +152,8 @@ def _compare_joints(
             yield "axis", "does not normalise an axis"
     if joint.kind is not JointKind.FIXED:
         limit = joint.limit and {x: getattr(joint.limit, x) for x in (*_LOWER_UPPER, *_VELOCITY_EFFORT)}
-        if (found := _read_limit(theirs)) != limit:
-            yield f"limit {found}, not {limit}", ""
+        if (their_limit := _read_limit(theirs)) != limit:
+            yield f"limit {their_limit}, not {limit}", ""
     if mimic and rule != joint.mimic:
         yield f"mimic rule {rule}, not {joint.mimic}", ""
 
@@ -165,8 +165,8 @@ def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
     bounded = joint.type in _BOUNDED_KINDS
     bounds = {x: (getattr(joint.limit, x) or 0.0) if bounded else None for x in _LOWER_UPPER}
     others = {x: getattr(joint.limit, x) for x in _VELOCITY_EFFORT}
-    endless = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
-    return {x: endless[x] if value is None else value for x, value in {**bounds, **others}.items()}
+    unlimited = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
+    return {x: unlimited[x] if value is None else value for x, value in {**bounds, **others}.items()}
 
 
 def _read_mimic_rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
@@ -190,10 +190,10 @@ def _find_quaternion_joints(text: str) -> set[str]:
 
 
 def _compare_names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    found, own = Counter(iter(theirs)), Counter(iter(ours))
-    for name in found.keys() | own.keys():
-        if found[name] != own[name]:
-            yield f"{what} {name}: yourdfpy finds {found[name]}, urdfkin finds {own[name]}"
+    their_counts, our_counts = Counter(iter(theirs)), Counter(iter(ours))
+    for name in their_counts.keys() | our_counts.keys():
+        if their_counts[name] != our_counts[name]:
+            yield f"{what} {name}: yourdfpy finds {their_counts[name]}, urdfkin finds {our_counts[name]}"
 
 
 def _shorten(differences: list[str]) -> list[str]:
