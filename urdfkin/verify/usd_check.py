@@ -142,9 +142,8 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
         R = rotation_from_quaternion(ours[quaternion]).T @ rotation_from_quaternion(theirs[quaternion])
         ratios.append(_compute_angle(R) / (_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF))
     for a, b in zip(ours[7], theirs[7], strict=True):
-        finite = abs(a) < np.inf
-        if finite and a != b:
-            ratios.append(abs(a - b) / (SINGLE_ROUNDOFF * abs(a)) if a else np.inf)
+        if a != b:
+            ratios.append(abs(a - b) / (SINGLE_ROUNDOFF * abs(a)) if a and np.isfinite(a) else np.inf)
     if not max(ratios) <= 1.0:
         raise _make_error(f"{name}, joint {path}", f"{max(ratios):.3g} times the bound of single precision")
     return max(ratios)
