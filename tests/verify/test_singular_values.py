@@ -1,6 +1,7 @@
 """Singular values with fifty digits lie within the bounds; a singular Jacobian is explained."""
 
 import pickle
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -210,6 +211,15 @@ def test_bounds_of_singular_values_include_underflow_of_products(monkeypatch: py
     monkeypatch.setattr(np.linalg, "svd", lambda *_, **__: svd)
     values = singular_values(A, np.zeros(A.shape), np.ones(256, dtype=bool)).values
     assert values.lower[0] <= 1600 * least <= values.upper[0]
+
+
+def test_bounds_of_singular_values_include_the_rounding_of_long_sums_in_a_batch() -> None:
+    # NumPy adds the squares of a batch one after the other, and 1 + x^2 is rounded to 1.
+    x = 0.7 * 2.0**-26
+    error = np.full((40, 1, 6000), x)
+    error[..., 0] = 1.0
+    upper = singular_values(np.zeros(error.shape), error, np.ones(6000, dtype=bool)).values.upper
+    assert all(Fraction(float(one)) ** 2 >= 1 + 5999 * Fraction(x) ** 2 for one in upper.ravel())
 
 
 def test_the_measure_of_orthogonality_includes_the_rounding_of_the_product() -> None:

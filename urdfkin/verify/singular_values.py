@@ -260,6 +260,8 @@ def _bound_norm(E: FloatArray) -> FloatArray:
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
+        # `_RELATIVE_ROUNDING_ERROR` does not cover the sum of many squares.
+        norm *= 1.0 + E.shape[-2] * E.shape[-1] * EPS
     return _bound_above(norm)
 
 
