@@ -51,9 +51,11 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
+        answer: Last answer of the process that contains a robot.
         shapes_refusal: None if the robot comes from the complete file. Otherwise, the robot comes from
-            the file without shapes and inertias. With check=True, the text says why reading the
-            complete file failed.
+            the file without shapes and inertias, and the text says why. The text has no meaning if
+            `read_mjcf` was called without `with_check_data`.
+        pinocchio: Placements of the bodies by Pinocchio's MJCF reader, or an error. None without an answer.
     """
 
     urdf: str
@@ -67,10 +69,13 @@ class MjcfReading:
 def read_mjcf(
     source: str | bytes | os.PathLike[str], *, with_check_data: bool = True, timeout: float = TIMEOUT
 ) -> MjcfReading:
-    """Read an MJCF robot in a separate process.
+    """Read an MJCF file or text in a separate process.
 
     If `with_check_data` is True, the process computes data for `check_mjcf_source`.
     `timeout` is in seconds.
+
+    Raises:
+        InputError: MuJoCo or urdfkin does not accept the file, or the process ends without a robot.
     """
     version()
     name = source_name(source)
@@ -121,7 +126,11 @@ def _request_answers(request: Mapping[str, Any], timeout: float) -> tuple[list[d
 
 
 def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
-    """Compare a robot with MuJoCo's model."""
+    """Compare a robot with MuJoCo's model, and return a sentence about the result.
+
+    Raises:
+        OracleError: A body, a site or a mimic rule differs from MuJoCo's by more than rounding errors.
+    """
     tree, answer = verifier.tree, reading.answer
     q = unpack_array(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
@@ -151,11 +160,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Compare mimic rules with MuJoCo's joint equalities.
-
-    Returns:
-        Largest ratio of error to bound, or None if there are no rules.
-    """
+    """Return the largest ratio of error to bound, or None if there are no rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())

@@ -4,9 +4,12 @@ A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require a
 or crash a parser. The process reads a request from standard input, and writes each answer as a line of JSON
 to standard output:
 
-1. the robot, compiled without its shapes
-2. the robot, compiled from the complete file
+1. the robot, compiled without shapes and inertias
+2. the robot, compiled from the complete file, or the reason why MuJoCo does not compile this file
 3. the placements of the bodies by Pinocchio's reader
+
+A request without samples has no third answer. Such a request has the second answer only if MuJoCo aligns a
+free body with its inertial frame.
 
 If the process ends early, the answers that it has already written remain valid.
 """
@@ -89,6 +92,9 @@ def parse_answers(
 
     Returns:
         All answers, and a text on the process's end. The text explains a missing answer.
+
+    Raises:
+        InputError: An answer is an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -174,10 +180,7 @@ def _compute_with_pinocchio(path: str, mjcf: Mjcf, q: FloatArray) -> dict[str, A
 def _compute_pinocchio_placements(
     path: str, qpos: FloatArray, qpos_index: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return Pinocchio's placements of the bodies.
-
-    `qpos_index` contains each joint's first index in `qpos`.
-    """
+    # `qpos_index` contains each joint's first index in a row of `qpos`.
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)

@@ -4,7 +4,7 @@ MuJoCo reads the origins and axes of joints from the URDF text with its own pars
 Pinocchio, MuJoCo computes with unit quaternions, and MuJoCo's six-vectors refer to a centre of mass. This
 module changes the text before MuJoCo reads it:
 
-- Each link becomes a body. Meshes and inertials are removed. In the compiled model, only the root has a mass.
+- Each link becomes a body without meshes. In the compiled model, only the root has a mass.
   The centre of mass, to which MuJoCo's results refer, is therefore the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
@@ -14,8 +14,9 @@ module changes the text before MuJoCo reads it:
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
-floating or planar joint, urdfkin's v is in the axes of the child link, but MuJoCo's qvel is in the axes of
-the parent link. S therefore also contains the rotation from the child's axes to the parent's axes.
+floating or planar joint, urdfkin's linear velocity is in the axes of the child link. The velocities of
+MuJoCo's slide joints are in the axes of the joint frame. S therefore also contains the rotation from the
+child's axes to the joint frame's axes. The angular velocities are equal.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from urdfkin.verify.pinocchio import tree_depth
 
 #: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
-#: Maximum number of links in a chain.
+#: Maximum number of joints on a path.
 #: MuJoCo's loading time grows with the square of the number of links.
 #: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
 _MAX_DEPTH = 1_000
@@ -77,10 +78,10 @@ class _MujocoIndices:
     Attributes:
         qpos: Index in MuJoCo's vector.
         qvel: Index in MuJoCo's vector.
-        q: Index in urdfkin's q; -1 for a moving base.
+        q: Index in urdfkin's q; -1 for a moving base. A mimic joint has the mimicked joint's index.
         v: Index in urdfkin's v; -1 for a moving base or locked joint.
-        multiplier: 0 for a locked joint.
-        offset: Value of a locked joint.
+        multiplier: From the mimic rule; 0 for a locked joint.
+        offset: From the mimic rule, or the value of a locked joint.
     """
 
     kind: str
@@ -232,16 +233,12 @@ class MujocoOracle(Oracle):
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         J, rate = np.empty((2, len(x.q), len(x.frames), 6, self.nv))
         velocity = np.empty((len(x.q), len(x.frames), 6))
-        S_all, S_rate_all = (
-            self._compute_velocity_matrix(x.q),
-            self._compute_velocity_matrix_rate(x.q, x.v),
-        )
+        S_all = self._compute_velocity_matrix(x.q)
+        S_rate_all = self._compute_velocity_matrix_rate(x.q, x.v)
 
         def store(body: int, index: tuple[int, int]) -> None:
-            S, S_rate = (
-                S_all[index[0] % len(S_all)],
-                S_rate_all[index[0] % len(S_rate_all)],
-            )
+            k = index[0]
+            S, S_rate = S_all[k % len(S_all)], S_rate_all[k % len(S_rate_all)]
             J_full = self._read_jacobian(self._mujoco.mj_jac, body)
             J[index] = J_full @ S
             rate[index] = self._read_jacobian(self._mujoco.mj_jacDot, body) @ S + J_full @ S_rate
@@ -304,7 +301,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _read_six_vector(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Read a velocity or acceleration [linear; angular] in world axes."""
+        """Read a velocity or classical acceleration [linear; angular] in world axes."""
         six = np.empty(6)
         # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
@@ -368,10 +365,7 @@ class MujocoOracle(Oracle):
         return S
 
     def _compute_velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative of S.
-
-        For floating and planar joints, R' = R [w]x.
-        """
+        """Return the time derivative of S: R' = R [w]x for floating and planar joints."""
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, first = joint.qvel, joint.v
@@ -385,12 +379,7 @@ class MujocoOracle(Oracle):
 
 
 def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return a joint's rotations.
-
-    Returns:
-        Planar joint: (n, 2, 2) rotation matrices, and 2.
-        Floating joint: (n, 3, 3) rotation matrices, and 3.
-    """
+    """Return (n, 2, 2) rotations and 2 for a planar joint, (n, 3, 3) rotations and 3 for a floating joint."""
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _make_rotation_matrix(_normalise_quaternion(coordinates)), 3
@@ -404,10 +393,7 @@ def _normalise_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    """Move all mass to the root.
-
-    The model's centre of mass is then exactly the root's origin.
-    """
+    # The model's centre of mass is then exactly the root's origin.
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
         mass[:] = 0.0

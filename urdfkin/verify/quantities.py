@@ -53,7 +53,8 @@ class Quantity:
         inputs: "q", "qv" or "qva".
         shape: Shape of one result, for example (6, "nv").
         compute: `compute(plan, *inputs, reference, base=, out=, threads=)` returns urdfkin's results.
-            If `recursive` is False, `compute` may have other arguments.
+            If `recursive` is False, `compute` may have other arguments. If `has_reference` is False,
+            `compute`, `scale` and `compute_intervals` have no argument `reference`.
         ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
@@ -64,8 +65,8 @@ class Quantity:
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
         recursive: True if one forward recursion computes the result, without further arguments such as
             `gravity`.
-        in_validation: Whether `validate` compares the quantity. False for Hessians, which are nv times
-            larger than Jacobians.
+        in_validation: `validate` compares the quantity if `recursive` and `in_validation` are True. False for
+            Hessians, which are nv times larger than Jacobians.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.
     """

@@ -5,7 +5,7 @@ axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
 yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
 normalise axes. The report separates these faults from other differences. For a missing number, yourdfpy
-returns None. The comparison replaces None by the default value of the URDF specification.
+returns None. The comparison replaces None by urdfkin's default value.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
 #: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
-#: A sine and a cosine have an error of one eps each.
-#: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
+#: An entry is a b c + d e with sines and cosines a to e, and |a b c| + |d e| <= 1.
+#: Each sine and cosine has a relative error of at most one eps, which changes the entry by at most 3 eps.
+#: Rounding the products and the sum changes the entry by at most 1.5 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference between two programs' normalised axes, per component.
 #: In urdfkin and yourdfpy, the relative error of an axis's length is at most 2 eps.
@@ -71,7 +72,7 @@ def compare_with_yourdfpy(
 ) -> SecondReading:
     """Compare yourdfpy's tree with urdfkin's tree.
 
-    If `root_joint` is True, the tree's first joint is not compared.
+    If `root_joint` is True, the tree's first link and first joint are not compared.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     # A document type declaration can make yourdfpy read other files.
@@ -159,7 +160,7 @@ def _compare_joints(
 
 
 def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
-    """Return the limit with the URDF's default values."""
+    """Return the limit with urdfkin's default values."""
     if joint.limit is None:
         return None
     bounded = joint.type in _BOUNDED_KINDS

@@ -15,8 +15,9 @@
 
     error of a sum of m products <= m eps * (sum of the absolute values of the products)
 
-*Range.* No intermediate value leaves the range of doubles: the numbers of a norm are divided by the largest
-number, and products are computed from mantissas and exponents.
+*Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. The
+numbers of a norm are divided by the largest number, and products are computed from mantissas and exponents.
+If the residual overflows, the lower bound is 0 and the upper bound is inf.
 """
 
 from __future__ import annotations
@@ -137,7 +138,7 @@ class SingularValues(Displayable):
     def manipulability(self) -> BoundedArray:
         """Product of the singular values, (...): Yoshikawa's manipulability sqrt(det J J^T).
 
-        If J has more rows than columns, the manipulability is sqrt(det J^T J).
+        If J has more rows than columns, the manipulability is sqrt(det J^T J). Without columns, it is 0.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -155,7 +156,7 @@ class SingularValues(Displayable):
     def condition(self) -> BoundedArray:
         """Condition number (...): the largest singular value divided by the smallest.
 
-        The upper bound is inf if the smallest value may be 0.
+        The upper bound is inf if the smallest value may be 0. Without columns, all numbers are NaN.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -220,7 +221,7 @@ def singular_values(
 ) -> SingularValues:
     """Return singular values with guaranteed bounds.
 
-    `error` bounds the error of each number of J. `is_active` (nv,) is False for columns that are always 0.
+    `error` bounds the error of each number of J. `is_active` (nv,) is False for left-out columns.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)

@@ -36,6 +36,7 @@ _MAX_COLUMNS = 16
 #: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
 _ROUNDINGS = 16.0
 #: At random configurations, singular values count as 0 if they are below this fraction of the norm.
+#: Unit vectors count as parallel if the smaller singular values are below this number.
 _RANK_TOLERANCE = 1e-9
 
 
@@ -43,15 +44,14 @@ _RANK_TOLERANCE = 1e-9
 class FrameJacobian:
     """A robot's Jacobian with names.
 
-    `sample_jacobians` always uses a fixed base. With a moving base, permanently lost directions are unknown.
-
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, world axes.
         error: (..., 6, nv) bounds on the errors of J.
         is_revolute: (nv,) True: revolute joint. False: prismatic joint.
             None: planar joint, floating joint, or joint that a mimic joint follows.
         active_entries: (6, nv) False for entries that are always 0.
-        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations.
+        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
+            base. Directions without motion can be different with a moving base.
         moving_base: Whether a base motion is given.
     """
 
@@ -183,11 +183,7 @@ class _SingularityExplainer:
         return Singularity(self._rank, full_rank, smallest_value_bound, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Compare the Jacobians at random configurations.
-
-        Returns:
-            The largest rank, and the directions without motion in all samples.
-        """
+        """Return the largest rank, and orthonormal columns of directions without motion in all samples."""
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         generic_rank = max(
             int(np.linalg.matrix_rank(J, tol=_RANK_TOLERANCE * np.linalg.norm(J))) for J in samples
@@ -225,7 +221,6 @@ class _SingularityExplainer:
             yield f"{len(motions)} independent joint motions of {joints} do not move {frame}."
 
     def _find_dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield minimal sets of dependent columns."""
         if self._A.shape[1] > _MAX_COLUMNS:
             return
         found: list[set[int]] = []
@@ -240,8 +235,9 @@ class _SingularityExplainer:
                     yield columns
 
     def _merge_overlapping_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Merge overlapping pairs of dependent columns."""
         joined: list[set[int]] = []
+        # In linear rows, a minimal set of three columns spans a plane, but three columns in merged pairs span
+        # a line. `_describe_linear_rows` does not describe the line.
         if self._linear_only:
             return sets
         for pair in (set(columns) for columns in sets if len(columns) == 2):
@@ -346,7 +342,7 @@ class _SingularityExplainer:
 
 
 def _make_sparse_basis(rows: FloatArray) -> FloatArray:
-    """Return a sparse basis of the row space."""
+    """Apply Gauss-Jordan elimination. A single row stays unchanged."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):

@@ -42,12 +42,11 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings, table_roundings
 from urdfkin.model.chain import make_chain
 from urdfkin.model.configuration import Samples
-from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
-_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
+#: The bound counts the sum of a table's lengths up to this multiple of the reach.
+#: No length in a table with Hayati rows exceeds this multiple (docs/dh.md).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -74,7 +73,7 @@ class TableCheck:
     Attributes:
         metres: Distance between the tips, m.
         radians: Angle between the orientations, rad.
-        units: Differences in units of eps * scale. The scale of an angle is 1.
+        units: Differences in units of eps * scale. The scale of the angle between orientations is 1.
         bound_ratios: Ratios of difference to bound.
         has_snapping: Whether the bound includes snapping.
         loss: Why very large lengths cause a difference, or None.
@@ -150,7 +149,6 @@ def sum_table_lengths(table: DHTable) -> float:
 
 
 def _describe_accuracy_loss(table: DHTable) -> str:
-    """Describe the longest length's rounding error."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -253,8 +251,8 @@ class ErrorScales:
         turning: (columns,) sum of |multiplier| over revolute joints
             on the paths from the root to the table's base and tip.
         sliding: (columns,) sum of |multiplier| over prismatic joints on these paths.
-        rates: (n,) sum of all |v|.
-        accelerations: (n,) sum of all |a|.
+        rates: (n,) sum of |multiplier v| over the joints on these paths.
+        accelerations: (n,) sum of |multiplier a| over these joints.
         rounding: (n,) relative error. The bound includes angles between axes that the table treats as
             parallel.
     """

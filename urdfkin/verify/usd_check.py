@@ -69,14 +69,18 @@ def read_usd(
     articulation: str | None = None,
     timeout: float = TIMEOUT,
 ) -> UsdReading:
-    """Read a USD robot in a separate process.
+    """Read a USD stage in a separate process.
 
     `variants` contains pairs (variant set, variant).
     `timeout` is in seconds.
+
+    Raises:
+        SourceError: The file is missing.
+        InputError: OpenUSD or urdfkin does not accept the stage, or the process ends without a robot.
     """
     version()
     path = expand_home(source)
-    read_bytes(path)  # `read_bytes` raises SourceError if the file is missing.
+    read_bytes(path)  # Raises SourceError.
     request = {
         "path": os.path.realpath(path),
         "name": str(path),
@@ -101,7 +105,11 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare a robot with OpenUSD's data."""
+    """Compare a robot with OpenUSD's data, and return a sentence about the result and a remark.
+
+    Raises:
+        OracleError: UsdPhysics reads a joint differently.
+    """
     joints = reading.answer["joints"]
     ratio = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
@@ -113,10 +121,7 @@ def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tupl
 
 
 def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Compare a joint with OpenUSD's data.
-
-    Returns:
-        Largest ratio of difference to bound.
+    """Return the largest ratio of difference to bound.
 
     Bounds, with u = `SINGLE_ROUNDOFF`, the relative error of one rounding to single precision:
 
@@ -159,10 +164,7 @@ def _make_error(where: str, found: str) -> OracleError:
 
 
 def _compute_angle(R: FloatArray) -> float:
-    """Return a rotation's angle, rad.
-
-    Small angles keep full accuracy.
-    """
+    """Return a rotation's angle, rad. Small angles keep full accuracy."""
     sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
@@ -250,7 +252,7 @@ def bound_single_precision_errors(
 
 
 def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare the poses of links and prims.
+    """Return a sentence about the difference between the poses of links and prims, and at most one remark.
 
     Bounds, with u = `SINGLE_ROUNDOFF` and n joints on the path from the root:
 
@@ -269,6 +271,9 @@ def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple
             normalizing the rows does not increase this length
             rotation by a small angle t: the nine entries change by a vector of length sqrt(2) t
             angle error <= sqrt(3/2) u
+
+        position error of one operation <= u + angle error, times the diameter of the robot
+        diameter <= twice the largest distance of a prim from the stage's origin
     """
     prims: dict[str, str] = answer["prims"]
     rows = unpack_array(answer["rest"])

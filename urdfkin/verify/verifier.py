@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table.
+#: Number of random configurations in the check of a table, besides zero and limit configurations.
 TABLE_SAMPLES = 40
 
 #: True: check all results of a call. False: check none.
@@ -152,7 +152,7 @@ class Verifier:
         return verifier
 
     def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
-        """Return why an oracle cannot check the robot."""
+        """Return why an oracle cannot check the robot, or None."""
         if library is PINOCCHIO and self.known_refusal is not None:
             return self.known_refusal
         if library.name not in self._refusals:
@@ -195,7 +195,12 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check and record the results of a call."""
+        """Check and record the results of a call.
+
+        Raises:
+            VerificationError: A result and the oracle's result differ by more than the bound.
+            RangeError: The oracle's result or a bound leaves the range of doubles.
+        """
         ledger, policy = self.ledger, self.resolve_policy(verify)
         if policy is False:
             ledger.count_unchecked(quantity.name, call.result_count)
@@ -312,6 +317,9 @@ class Verifier:
         """Check a Denavit-Hartenberg table.
 
         None means that Pinocchio cannot check the robot.
+
+        Raises:
+            TableError: The table and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError, check_table
 
@@ -336,6 +344,9 @@ class Verifier:
         """Check Khalil-Kleinfinger parameters with Pinocchio.
 
         None means that Pinocchio cannot check the robot.
+
+        Raises:
+            TableError: The parameters and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError
 
@@ -405,7 +416,7 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    With a fixed base and revolute joints, the bound of a placement or a Jacobian is constant.
+    With a fixed base and revolute joints, the bound of a quantity that depends only on q is constant.
     """
     v, a = (*x.rates, None, None)[:2]
     is_constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0

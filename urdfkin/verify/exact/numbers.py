@@ -30,7 +30,7 @@ from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Least number of decimal digits in the accuracy study.
+#: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
 #: Number of decimal digits for a path without joints: twice the 15 decimal digits of a double.
@@ -55,9 +55,8 @@ _precision_lock = make_fork_safe_lock()
 def enough_digits(joint_count: int) -> int:
     """Return the number of decimal digits for intervals on a path with `joint_count` joints.
 
-    With this number, an interval is narrower than the last digit of a double.
-    One more digit makes an interval ten times narrower.
-    A joint with an oblique axis makes an interval about twice as wide.
+    With this number, an interval is narrower than the last digit of a double: one more digit makes an
+    interval ten times narrower, and a joint with an oblique axis makes an interval about twice as wide.
     """
     return _BASE_DIGITS + joint_count
 
@@ -90,7 +89,6 @@ def interval_ends(x: Number) -> tuple[float, float]:
 
 
 def _round_outward(end: arb, towards: float) -> float:
-    """Round an exact number in the direction `towards`."""
     rounded = float(end)
     is_inside = arb(rounded) > end if towards < 0.0 else arb(rounded) < end
     return math.nextafter(rounded, towards) if is_inside else rounded

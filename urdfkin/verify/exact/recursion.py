@@ -39,8 +39,6 @@ _VELOCITY_AXES = {
 
 
 def make_base_state(base: BaseNumbers) -> LinkState:
-    """Return the base's motion as a link state."""
-
     def as_interval_vector(x: FloatArray) -> Vector:
         return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
 
