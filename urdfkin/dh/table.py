@@ -530,11 +530,11 @@ class DHTable(Displayable):
         >>> bool(metres < 1e-13), bool(radians < 1e-13)
         (True, True)
         """
-        metres = self.rounding(q)
-        radians = EPS * table_roundings(len(self.rows)) + np.zeros_like(metres)
+        values, metres = self.coupling.values(q), self.rounding(q)
+        turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
+        radians = EPS * (table_roundings(len(self.rows)) + np.abs(values[..., turns]).sum(axis=-1))
         if self.snap is None:
             return metres, radians
-        values = self.coupling.values(q)
         by_name = {row.joint: values[..., i] for i, row in enumerate(self.rows)}
         return metres + self.snap.bound(by_name), radians + self.snap.radians
 
