@@ -1,4 +1,4 @@
-"""Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
+"""Find a single mistake in a table: a wrong sign, an alpha wrong by a right angle, or a wrong order of rows.
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. If the
 cell is corrected first, the fit changes fewer parameters.
