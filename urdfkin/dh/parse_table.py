@@ -101,10 +101,11 @@ def find_table_in_text(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table.
+    """Content of a heading.
 
     Attributes:
-        name: Known name, otherwise "".
+        name: Standard name of the column; "" for an unknown heading.
+        heading: The heading without unit and index, in lower case.
         previous: Whether the heading has the index i-1.
     """
 

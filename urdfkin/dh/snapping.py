@@ -189,7 +189,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Snap each rotation's angle."""
+    """Return the product of elementary rotations (axis, angle) with snapped angles."""
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)

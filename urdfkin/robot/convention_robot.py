@@ -138,10 +138,7 @@ class ConventionRobot:
     def _call(
         self, method: Callable[..., FloatArray], inputs: tuple[Any, ...], *arguments: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Convert the inputs to urdfkin's convention, and call a method of `Robot` with the converted inputs.
-
-        Return the converted inputs and the method's result.
-        """
+        """Return the inputs in urdfkin's convention, and the method's result for these inputs."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", inputs, strict=False)

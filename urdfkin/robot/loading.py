@@ -391,7 +391,9 @@ def make_robot(
         verify=verify,
         mimic=mimic,
         findings=findings,
-        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced_findings))),
+        unverifiable=_find_unverified_reason(
+            (*findings, *(finding for finding, _ in report.silenced_findings))
+        ),
         oracle=oracle,
         base_frame=text.entry.base_frame if text.entry else None,
         tip_frame=text.entry.tip_frame if text.entry else None,
@@ -400,7 +402,7 @@ def make_robot(
     return robot if is_plain else robot.with_locked_joints(lock, joints)
 
 
-def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
+def _find_unverified_reason(findings: tuple[Finding, ...]) -> str | None:
     """Return why Pinocchio cannot check the robot, or None."""
     problems = {
         PinocchioReading.REFUSES: "Pinocchio refuses the file",

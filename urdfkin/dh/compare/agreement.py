@@ -211,11 +211,7 @@ def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Mark cells that the reference contains.
-
-    Returns:
-        (n, 5) ones and zeros.
-    """
+    """Return (n, 5): 1 for a cell that the reference contains, otherwise 0."""
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
