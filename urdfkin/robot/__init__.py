@@ -663,8 +663,8 @@ class Robot(Displayable):
         The conversion applies to q, v, a, Jacobians and six-vectors, in both directions.
 
         Args:
-            name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
-                path of a TOML file.
+            name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), the
+                path of a TOML file, or a `Convention`.
             joints: Names of the joints in the order of your program or policy; None: the order of the
                 convention.
 
@@ -1508,7 +1508,8 @@ class Robot(Displayable):
                 axis. "joint": d_1 and theta_1 are 0, and the table's base transform contains the offset and
                 the rotation (Craig's choice).
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
-                length a is not negative. "alpha": the angle alpha is not negative.
+                length a is not negative. "alpha": the angle alpha is not negative. The tip determines the x
+                axis of the last row.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
                 joint's origin in the URDF. `make_dh_table` lists exceptions, such as the first joint.
                 "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint, so

@@ -21,8 +21,8 @@ class ConventionRobot:
 
     Each method has the name and the arguments of a method of `Robot`. The target program's order applies
     to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's units
-    apply to q, v and a. Pinocchio checks each result before the conversion. An array `out` receives the
-    result before the conversion.
+    apply to q, v and a, and to the columns of Jacobians: J v is in m/s and rad/s. Pinocchio checks each
+    result before the conversion. An array `out` receives the result before the conversion.
 
     Attributes:
         robot: The robot.
