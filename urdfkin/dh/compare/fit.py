@@ -66,7 +66,7 @@ _EXACT_FIT_ERROR = 1e-13
 _EXACT_TIP_ERROR = 1e-12
 #: Other joint signs are accepted if: tip error < this number * smallest tip error of earlier joint signs
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: A fit starts with fitted translations only if: tip error <= this number * reach
+#: Another fit starts with fitted translations if: tip error of this start <= this number * reach
 _CLOSE_START = 1e-6
 #: Large changes (rad) of two consecutive joint offsets: theta_i += angle, theta_{i+1} -= angle
 #: If alpha is nearer to pi than to 0, theta_{i+1} += angle.
@@ -376,17 +376,22 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 def start_models(
     chain: FrameChain, standard: DHTable, targets: TargetPoses, *effort: int
 ) -> Iterator[TableArrays]:
-    """Yield the table, then a table for each likely combination of joint signs."""
+    """Yield the table, then one or two tables for each likely combination of joint signs.
+
+    The second table of a combination has fitted translations.
+    """
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
         model = replace(TableArrays.of(standard), senses=senses, base=alignment.base, tool=alignment.tool)
         model.cells[range(len(senses)), model.variable_indices] += alignment.offsets
+        yield model
         # If an axis is nearly parallel to a prismatic joint's axis, this joint's offset can be wrong by
         # hundreds of metres. The steps of a fit are too short for such an offset.
         moved = _fit_translations(model, targets)
         metres, radians = targets.largest_errors(moved)
-        yield moved if metres + targets.scale * radians <= _CLOSE_START * targets.scale else model
+        if metres + targets.scale * radians <= _CLOSE_START * targets.scale:
+            yield moved
 
 
 def _fit_translations(model: TableArrays, targets: TargetPoses) -> TableArrays:
