@@ -21,8 +21,8 @@ CHANGES = [
      "M - M @ (0.5 * defect)", "np.swapaxes(M - M @ (0.5 * defect), -1, -2)"),
     ("kinematics.rotation.nearest_rotation", "M - M @ (0.5 * defect)", "M + M @ (0.5 * defect)"),
     # a call's inputs and its results
-    ("verify.call.Call._flat_input", "array.reshape(self.n, width)", "array.reshape(self.n, width)[::-1]"),
-    ("verify.call.Call._flat_input",
+    ("verify.call.Call._flatten_input", "array.reshape(self.n, width)", "array.reshape(self.n, width)[::-1]"),
+    ("verify.call.Call._flatten_input",
      "np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width)",
      "np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width)[::-1]"),
     ("verify.call.Call.__init__",

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[Any]
+AnyArray = NDArray[Any]
 
 
-def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
+def euler_jacobian(name: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, AnyArray]:
     """Return the Jacobian of position and Euler angles.
 
     The rotation R = R_i R_j R_k has these rotation axes:
@@ -50,7 +50,7 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), length[..., 0]
 
 
-def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
+def quaternion_jacobian(quat: AnyArray, J_v: AnyArray) -> AnyArray:
     """Return the Jacobian of position and quaternion.
 
     The derivative of `quat` is half a quaternion product:

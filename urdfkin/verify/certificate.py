@@ -17,7 +17,7 @@ from urdfkin.system.documents import Count, DocumentKind, Header, NonNegativeFlo
 from urdfkin.system.files import expand_home, write_file
 from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.verify.comparison import BatchComparison
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import package_versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
@@ -199,7 +199,7 @@ class Certificate(Displayable):
         """
         document = {
             "schema": CERTIFICATE.name,
-            "versions": versions() | ({"urdfkin": self.urdfkin} if self.urdfkin else {}),
+            "versions": package_versions() | ({"urdfkin": self.urdfkin} if self.urdfkin else {}),
             "sha256": [self.sha256 or None],
             "verdict": CERTIFICATE.verdicts[not self.verified],
             "command": None,

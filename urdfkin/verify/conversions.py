@@ -59,7 +59,7 @@ _SAMPLE_COUNT = 8
 #: The error of each program is less than 8 eps.
 #: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
 #: Quaternions need a square root, a quotient and products of two numbers.
-_ROUNDINGS = 16.0
+_ORIENTATION_ROUNDINGS = 16.0
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
@@ -184,7 +184,7 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
         theirs = np.array([pin.Quaternion(row).toRotationMatrix() for row in numbers])
     theirs = theirs.reshape(-1, 3, 3)
     defect = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).sum(axis=(-1, -2))
-    bound = _ROUNDINGS * EPS + 2.0 * defect
+    bound = _ORIENTATION_ROUNDINGS * EPS + 2.0 * defect
     off = np.abs(theirs - R).max(axis=(-1, -2))
     if (off <= bound).all():
         return
@@ -214,7 +214,7 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
-    theirs = _model_placements(model, _model_configurations(model, tree, q), made)
+    theirs = _compute_model_placements(model, _convert_configurations(model, tree, q), made)
     # The factor 2 allows for rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
@@ -231,7 +231,7 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     )
 
 
-def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
+def _compute_model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
     """Return the placements of joints, then of frames."""
     pin = pinocchio()
     data = model.createData()
@@ -243,7 +243,7 @@ def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatA
     return out
 
 
-def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
+def _convert_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
     """Convert q of urdfkin's tree to q of the `pinocchio.Model`.
 
     Joints are matched by name.

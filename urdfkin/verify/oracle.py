@@ -7,11 +7,11 @@ conversion therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
-| mimic rules | `rules_of_text` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
+| mimic rules | `parse_mimic_rules` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
 | names, batch shapes | `OracleQuery` | `urdfkin.verify.call` |
 | order of q, v and a | `PinocchioLayout` | `KinematicTree` |
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
-| moving base | `free_flyer` and others | `BaseMotion` |
+| moving base | `free_flyer_q` and others | `BaseMotion` |
 
 Mimic rules: Pinocchio's model is built without mimic joints (`urdfkin.verify.pinocchio`). This module
 therefore reads the mimic rules from the URDF text.
@@ -47,10 +47,10 @@ from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
 from urdfkin.system.plain_xml import parse_xml
-from urdfkin.verify.bounds import KERNELS
+from urdfkin.verify.bounds import VERIFY_KERNELS_MODULE
 
 
-def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
+def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
     """Read the mimic rules of `joints`.
 
     All rules refer to independent joints.
@@ -103,7 +103,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 #: Sizes (nq, nv) of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 #: For example, a planar joint has nq = 4 in Pinocchio, and nq = 3 in urdfkin.
-_COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
+_URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
@@ -142,7 +142,7 @@ class PinocchioLayout:
         for name, size in zip(names, sizes, strict=True):
             if name not in rules:
                 at[name] = self.nq, self.nv
-                self.nq, self.nv = self.nq + _COORDINATE_COUNTS[size], self.nv + size[1]
+                self.nq, self.nv = self.nq + _URDFKIN_NQ[size], self.nv + size[1]
         self._joints = list[_JointIndices]()
         for j, name, size in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
@@ -165,7 +165,7 @@ class PinocchioLayout:
                 self._factor[joint.full_v + c] = joint.multiplier
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
-        self._single, self._angles = (self._select_by_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
+        self._single, self._angles = (self._collect_arrays(sizes) for sizes in ((1, 1), _CONTINUOUS))
         #: `_same_q` is True if Pinocchio can use q without conversion.
         #: `_same_v` is True if Pinocchio can use v without conversion.
         self._same_q = model.nq == self.nq and all(
@@ -175,7 +175,7 @@ class PinocchioLayout:
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
-    def _select_by_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    def _collect_arrays(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
             np.array([joint.full_q for joint in joints], dtype=np.int64),
@@ -223,7 +223,7 @@ class PinocchioLayout:
 
 #: Name that Pinocchio gives to the world. The world is the parent of a root joint.
 WORLD = "universe"
-_PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
+_PREFIX_PATTERN = re.compile(r"(link|joint):(.*)", re.DOTALL)
 
 
 class Frames:
@@ -259,7 +259,7 @@ class Frames:
             return body
         if joint is not None:
             return joint
-        if (parts := _PREFIXED.fullmatch(name)) is None:
+        if (parts := _PREFIX_PATTERN.fullmatch(name)) is None:
             raise self._error(f"{self._oracle} has no such frame", name)
         return self._find_index(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
@@ -287,7 +287,7 @@ def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Fram
     return Frames("Pinocchio", str(model.name), bodies, joints, parents)
 
 
-class BaseNumbers(Protocol):
+class BaseMotionLike(Protocol):
     """The user's motion of the base.
 
     Leading axes are batch axes.
@@ -306,25 +306,25 @@ class BaseNumbers(Protocol):
         """(..., 6) classical acceleration, [linear; angular] in world axes."""
 
 
-def free_flyer(base: BaseNumbers) -> FloatArray:
+def free_flyer_q(base: BaseMotionLike) -> FloatArray:
     """Return x, y, z, qx, qy, qz, qw of the base."""
     T = np.asarray(base.placement)
     return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
 
 
-def free_flyer_velocity(base: BaseNumbers) -> FloatArray:
+def free_flyer_velocity(base: BaseMotionLike) -> FloatArray:
     """Return the base's velocity in the base's axes."""
-    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
+    return _rotate_to_base_axes(free_flyer_q(base)[..., 3:], np.asarray(base.velocity))
 
 
-def free_flyer_acceleration(base: BaseNumbers) -> FloatArray:
+def free_flyer_acceleration(base: BaseMotionLike) -> FloatArray:
     """Return the base's spatial acceleration in the base's axes.
 
     The linear part is acc - w x vel.
     """
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
-    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
+    return _rotate_to_base_axes(free_flyer_q(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
@@ -446,20 +446,19 @@ class BaseRows(NamedTuple):
 class QueryBatch(NamedTuple):
     """The arguments of an oracle for n configurations.
 
-    Pinocchio's functions for one and for several frames may round differently.
-
     Attributes:
         frames_are_joints: If True, `frames` contains `JointFrame` objects.
             Pinocchio uses its functions for joints, such as `getJointJacobian`.
-        is_partial: If True, Pinocchio uses its function for several frames even for one frame.
+        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with its functions
+            for several frames, which may round differently.
     """
 
     frames: Sequence[str]
     inputs: tuple[FloatArray, ...]
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
-    base: BaseNumbers | None = None
+    base: BaseMotionLike | None = None
     frames_are_joints: bool = False
-    is_partial: bool = False
+    uses_multi_frame_functions: bool = False
 
     @property
     def q(self) -> FloatArray:
@@ -486,7 +485,7 @@ class OracleQuery:
         self,
         frame: str | Sequence[str],
         reference: Reference | str,
-        base: BaseNumbers | None,
+        base: BaseMotionLike | None,
         inputs: Sequence[ArrayLike],
         named_inputs: Sequence[str | Mapping[str, ArrayLike] | None] = (),
         joints: Sequence[tuple[str, int]] = (),
@@ -496,7 +495,7 @@ class OracleQuery:
         self.reference, self.base = reference, base
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
-    def convert_inputs(self) -> None:
+    def cache_inputs(self) -> None:
         """Convert the inputs before `out` changes.
 
         An array in a mapping may share memory with `out`.
@@ -570,9 +569,9 @@ class OracleQuery:
         return result.reshape(self.n, len(self.frames), *own)
 
 
-def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
+def read_mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
     try:
-        return rules_of_text(text, set(joints))
+        return parse_mimic_rules(text, set(joints))
     except (ValueError, ExpatError) as error:
         raise OracleError(
             "the oracle's reader cannot read the mimic rules", where=robot, found=str(error)
@@ -611,14 +610,14 @@ class Oracle:
         self.text, self.tree, self.mimic = text, tree, mimic
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
-    def read_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
+    def read_and_check_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
         """Return the joints' mimic rules.
 
         Raises:
             OracleError: the tree has other joints or another order.
         """
         tree = self.tree
-        rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
+        rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
         coordinates = [name for name in joints if name not in rules]
         for what, theirs, own in (
             ("joints", list(joints), [joint.name for joint in tree.joints if joint.kind.nv]),
@@ -685,7 +684,7 @@ def couple_columns(
     Column i, multiplied by `factor[i]`, is added to column `index[i]` of the product.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
-    if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:
+    if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:
         begin = time.thread_time()
         sums = _couple_rows(rows, columns, index, factor, nv)
         preload.add_time("coupling", time.thread_time() - begin)

@@ -33,11 +33,11 @@ from urdfkin.verify.oracle import (
     PinocchioLayout,
     QueryBatch,
     find_locked_values,
-    free_flyer,
     free_flyer_acceleration,
+    free_flyer_q,
     free_flyer_velocity,
     make_pinocchio_frames,
-    mimic_rules,
+    read_mimic_rules,
 )
 
 #: urdfkin requires these versions of Pinocchio.
@@ -117,7 +117,7 @@ MAX_NV = 315
 
 #: Number of floating-point values in a block of results.
 #: A block of this size fits into the processor's cache.
-_BLOCK_SIZE = 16384
+_FLOATS_PER_BLOCK = 16384
 #: `compute(n)` returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
@@ -150,15 +150,17 @@ def build_model(
         )
     depth = tree_depth(tree)
     if depth < _SAFE_DEPTH:
-        model = _parse(text, tree, root_joint, mimic)
+        model = _parse_model(text, tree, root_joint, mimic)
     else:
-        model = call_with_stack(depth * _STACK_BYTES_PER_LINK, lambda: _parse(text, tree, root_joint, mimic))
+        model = call_with_stack(
+            depth * _STACK_BYTES_PER_LINK, lambda: _parse_model(text, tree, root_joint, mimic)
+        )
     return _reduce_model(model, text, lock, lock_mimic_joints=lock_mimic_joints) if lock else model
 
 
 def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimic_joints: bool) -> Any:
     pin, q = pinocchio(), pinocchio().neutral(model)
-    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if lock_mimic_joints else {}
+    rules = read_mimic_rules(text, list(model.names)[1:], str(model.name)) if lock_mimic_joints else {}
     locked = find_locked_values(lock, rules)
     ids = [int(model.getJointId(name)) for name in locked]
     for i, (name, value) in zip(ids, locked.items(), strict=True):
@@ -181,7 +183,7 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
     return reduced
 
 
-def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
+def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
     pin = pinocchio()
     roots = {"floating": pin.JointModelFreeFlyer, "planar": pin.JointModelPlanar}
     try:
@@ -213,7 +215,7 @@ class PinocchioOracle(Oracle):
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
         if self.moving_base:
             joints, self._index = self._add_free_flyer(joints)
-        self._layout = PinocchioLayout(self._model, joints, names, self.read_rules(names))
+        self._layout = PinocchioLayout(self._model, joints, names, self.read_and_check_rules(names))
         self._joint_ids = dict(zip(names, joints, strict=True))
         self.new_data = self._model.createData
 
@@ -254,7 +256,7 @@ class PinocchioOracle(Oracle):
         q, *v_and_a = x.inputs[:count]
         full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:
-            full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
+            full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer_q(x.base)
         if self.moving_base and x.base is not None:
             for rates, of_base in zip(full[1:], (free_flyer_velocity, free_flyer_acceleration), strict=False):
                 rates[:, :6] = of_base(x.base)
@@ -290,14 +292,14 @@ class PinocchioOracle(Oracle):
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        if len(x.frames) == 1 and not (x.frames_are_joints or x.is_partial):
+        if len(x.frames) == 1 and not (x.frames_are_joints or x.uses_multi_frame_functions):
             shape = len(x.inputs[0]), 1, 6, self._model.nv
             return self._layout.couple(_stack_results(self._frame_jacobians(x), *shape))
         get = pin.getJointJacobian if x.frames_are_joints else pin.getFrameJacobian
-        return self._columns(x, 1, pin.computeJointJacobians, get)
+        return self._compute_columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        if len(x.frames) != 1 or x.frames_are_joints or x.is_partial or not self._model.nv:
+        if len(x.frames) != 1 or x.frames_are_joints or x.uses_multi_frame_functions or not self._model.nv:
             yield self.jacobians(x)
             return
         memory = np.empty((min(len(x.q), _block_length(6, self._model.nv)), 1, 6, self._model.nv))
@@ -314,9 +316,9 @@ class PinocchioOracle(Oracle):
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
         get = pin.getJointJacobianTimeVariation if x.frames_are_joints else pin.getFrameJacobianTimeVariation
-        return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
+        return self._compute_columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
 
-    def _columns(
+    def _compute_columns(
         self, x: QueryBatch, count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
     ) -> FloatArray:
         inputs, ids, wanted = (
@@ -413,7 +415,7 @@ def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[Float
 
 
 def _block_length(*shape: int) -> int:
-    return _BLOCK_SIZE // (math.prod(shape) or 1) or 1
+    return _FLOATS_PER_BLOCK // (math.prod(shape) or 1) or 1
 
 
 def tree_depth(tree: KinematicTree) -> int:

@@ -25,7 +25,7 @@ from urdfkin.verify.exact.numbers import (
     rotation_about,
     rotation_from_quaternion,
 )
-from urdfkin.verify.oracle import BaseNumbers
+from urdfkin.verify.oracle import BaseMotionLike
 
 _RECURSION = Recursion(equations)
 
@@ -38,7 +38,7 @@ _FREE_AXES = {
 }
 
 
-def make_base_state(base: BaseNumbers) -> LinkState:
+def make_base_state(base: BaseMotionLike) -> LinkState:
     """Return the base's motion as a link state."""
 
     def vector(x: FloatArray) -> Vector:
