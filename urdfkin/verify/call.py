@@ -31,7 +31,7 @@ class CallPart(NamedTuple):
 
     Attributes:
         rates: (), (v,) or (v, a).
-        state: (n or 1, 24) base state.
+        state: (n or 1, 24) result of `BaseMotion.state`.
         query: Input of the oracle, converted independently.
     """
 
@@ -48,7 +48,10 @@ class Call:
     """The inputs of one call.
 
     Args:
-        additional_frames: Computed frames outside the result.
+        plan: Compiles the tree for link indices.
+        q_v_a: q, or q and v, or q, v and a.
+        additional_frames: Frames that the call computes, but that are not part of the result.
+        options: Arguments of a quantity, for example `gravity`.
     """
 
     def __init__(
@@ -110,17 +113,16 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError.
-        The subclass's `reshape` may return another shape.
-        With another shape, a kernel could write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError, because its `reshape` may return another
+        shape. A kernel could then write past the end of `out`.
         """
         if out is None:
             return None
-        wanted = (*self.shape, *((len(self.links),) if self.is_list else ()), *shape)
-        good = type(out) in _PLAIN_ARRAY_TYPES and out.dtype == np.float64 and out.flags.carray
-        if not good or out.shape != wanted:
+        expected_shape = (*self.shape, *((len(self.links),) if self.is_list else ()), *shape)
+        is_usable = type(out) in _PLAIN_ARRAY_TYPES and out.dtype == np.float64 and out.flags.carray
+        if not is_usable or out.shape != expected_shape:
             raise InputError(
-                f"out must be a writable C-contiguous float64 array of shape {wanted}",
+                f"out must be a writable C-contiguous float64 array of shape {expected_shape}",
                 found=_describe_array(out),
                 remedy="np.asarray(out) is a plain array"
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN_ARRAY_TYPES
@@ -137,10 +139,7 @@ class Call:
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def run_and_locate_error(self, function: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`.
-
-        The error about a non-finite input names the joint.
-        """
+        """Call `function`, and name the joint in the error about a non-finite input."""
         try:
             return function(*arguments, **options)
         except NotFiniteError:
@@ -166,7 +165,7 @@ def _describe_array(out: object) -> str:
         "not C-contiguous": out.flags.c_contiguous,
         "not aligned": out.flags.aligned,
     }
-    faults = (fault for fault, good in flags.items() if not good)
+    faults = (fault for fault, is_good in flags.items() if not is_good)
     return ", ".join((f"{type(out).__name__} of {out.dtype} {out.shape}", *faults))
 
 
