@@ -89,11 +89,11 @@ CHANGES = [
     ("verify.oracle.PinocchioLayout.__init__", "at[rule.mimicked_joint]", "at[rule.mimicked_joint][::-1]"),
     ("verify.oracle.Frames.find_index", "self._bodies.get(name)", "self._bodies.get(name[5:])"),
     ("verify.oracle.OracleQuery.select.pick",
-     "spread[np.unravel_index(numbers, self.shape)]",
-     "spread[np.unravel_index(numbers, self.shape)][::-1]"),
+     "broadcast_x[np.unravel_index(indices, self.shape)]",
+     "broadcast_x[np.unravel_index(indices, self.shape)][::-1]"),
     ("verify.oracle.OracleQuery.flatten_result",
-     "result.reshape(self.n, len(self.frames), *own)",
-     "result.reshape(self.n, len(self.frames), *own)[::-1]"),
+     "result.reshape(self.n, len(self.frames), *own_shape)",
+     "result.reshape(self.n, len(self.frames), *own_shape)[::-1]"),
 ]  # fmt: skip
 
 

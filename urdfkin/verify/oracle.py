@@ -16,8 +16,8 @@ conversion therefore causes a disagreement.
 Mimic rules: Pinocchio's model is built without mimic joints (`urdfkin.verify.pinocchio`). This module
 therefore reads the mimic rules from the URDF text.
 
-Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
-planar joint three, a floating joint seven, and a mimic joint none.
+Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one
+number, a planar joint three, a floating joint seven, and a mimic joint none.
 
 Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the nearest
 rotation to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
@@ -51,9 +51,11 @@ from urdfkin.verify.bounds import VERIFY_KERNELS_MODULE
 
 
 def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Read the mimic rules of `joints`.
+    """Read the mimic rules of `joints`. The returned rules refer to independent joints.
 
-    All rules refer to independent joints.
+    Raises:
+        ValueError: a multiplier or an offset is not a number.
+        ExpatError: the text is not valid XML.
     """
     if "mimic" not in text:
         return {}
@@ -92,17 +94,17 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
     >>> find_locked_values({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
     """
-    moved = {
+    mimic_values = {
         name: rule.multiplier * lock[rule.mimicked_joint] + rule.offset
         for name, rule in rules.items()
         if rule.mimicked_joint in lock
     }
-    return {**lock, **moved}
+    return {**lock, **mimic_values}
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-#: For example, a planar joint has nq = 4 in Pinocchio, and nq = 3 in urdfkin.
+#: nq of a joint in urdfkin, by the joint's (nq, nv) in Pinocchio.
 _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
@@ -128,6 +130,10 @@ class _JointIndices(NamedTuple):
 
 class PinocchioLayout:
     """Converts between Pinocchio's and urdfkin's layouts.
+
+    Args:
+        joints: Pinocchio's indices of the moving joints, without the base.
+        names: Names of these joints in the URDF.
 
     Attributes:
         rate_columns: Column indices of moving joints in Pinocchio's Jacobian, mimic joints included.
@@ -166,8 +172,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._collect_arrays(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: `_same_q` is True if Pinocchio can use q without conversion.
-        #: `_same_v` is True if Pinocchio can use v without conversion.
+        #: True if Pinocchio can use q (`_same_q`) or v (`_same_v`) without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -254,29 +259,26 @@ class Frames:
             return self._find_index(self._joints, name, str(name)[6:])
         body, joint = self._bodies.get(name), self._joints.get(name)
         if body is not None and joint is not None and self._parents.get(body, body) != joint:
-            raise self._error(f"two of {self._oracle}'s frames have this name", name)
+            raise self._make_error(f"two of {self._oracle}'s frames have this name", name)
         if body is not None:
             return body
         if joint is not None:
             return joint
         if (parts := _PREFIX_PATTERN.fullmatch(name)) is None:
-            raise self._error(f"{self._oracle} has no such frame", name)
+            raise self._make_error(f"{self._oracle} has no such frame", name)
         return self._find_index(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
     def _find_index(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
         if (index := frames.get(plain_name)) is None:
-            raise self._error(f"{self._oracle} has no such frame", name)
+            raise self._make_error(f"{self._oracle} has no such frame", name)
         return index
 
-    def _error(self, what: str, name: str) -> OracleError:
-        return OracleError(what, where=self._robot, found=repr(str(name)))
+    def _make_error(self, message: str, name: str) -> OracleError:
+        return OracleError(message, where=self._robot, found=repr(str(name)))
 
 
 def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Frames:
-    """List a Pinocchio model's frames.
-
-    If `includes_world` is True, Pinocchio's world is the link `WORLD`.
-    """
+    """List a Pinocchio model's frames. If `includes_world` is True, Pinocchio's world is the link `WORLD`."""
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
@@ -328,10 +330,7 @@ def free_flyer_acceleration(base: BaseMotionLike) -> FloatArray:
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
-    """Return the unit quaternion of the nearest rotation.
-
-    The scalar is the last component.
-    """
+    """Return the unit quaternion, scalar last, of the rotation nearest to M (q-method, see the module)."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Because of rounding, the computed q has small components along the other eigenvectors of K.
@@ -373,8 +372,7 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Suffixes of coordinate names, by the number of joint velocities.
-#: A planar joint has three joint velocities, a floating joint six.
+#: Suffixes of coordinate names, by the number of joint velocities: planar joint 3, floating joint 6.
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 #: Suffixes of velocity names, by the number of joint velocities.
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
@@ -496,10 +494,7 @@ class OracleQuery:
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
     def cache_inputs(self) -> None:
-        """Convert the inputs before `out` changes.
-
-        An array in a mapping may share memory with `out`.
-        """
+        """Convert and store the inputs before `out` changes: an array in a mapping may share its memory."""
         _ = self._inputs
 
     @cached_property
@@ -516,12 +511,12 @@ class OracleQuery:
     def _set_named_values(
         self,
         x: FloatArray,
-        named_inputs: str | Mapping[str, ArrayLike],
+        named_values: str | Mapping[str, ArrayLike],
         suffixes: Mapping[int, tuple[str, ...]],
     ) -> FloatArray:
         names = _CoordinateNames(self._joints, suffixes)
         for name, value in (
-            named_inputs.items() if isinstance(named_inputs, Mapping) else names.split_pairs(named_inputs)
+            named_values.items() if isinstance(named_values, Mapping) else names.split_pairs(named_values)
         ):
             x[..., names.find_index(name)] = (
                 _parse_number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -543,30 +538,34 @@ class OracleQuery:
     def select(self, part: slice | IntArray) -> QueryBatch:
         """Select configurations by flat indices."""
 
-        def pick(x: FloatArray, own: int = 1) -> FloatArray:
-            batch, one = x.shape[: x.ndim - own], x.shape[x.ndim - own :]
-            if batch == self.shape:
-                return x.reshape(self.n, *one)[part]
-            numbers = np.arange(part.start, part.stop) if isinstance(part, slice) else part
-            spread: FloatArray = np.broadcast_to(x, (*self.shape, *one))
-            return spread[np.unravel_index(numbers, self.shape)]
+        def pick(x: FloatArray, own_axes: int = 1) -> FloatArray:
+            batch_shape, own_shape = x.shape[: x.ndim - own_axes], x.shape[x.ndim - own_axes :]
+            if batch_shape == self.shape:
+                return x.reshape(self.n, *own_shape)[part]
+            indices = np.arange(part.start, part.stop) if isinstance(part, slice) else part
+            broadcast_x: FloatArray = np.broadcast_to(x, (*self.shape, *own_shape))
+            return broadcast_x[np.unravel_index(indices, self.shape)]
 
         base = self.base
         if base is not None:
             base = BaseRows(pick(base.placement, 2), pick(base.velocity), pick(base.acceleration))
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
-    def flatten_result(self, result: FloatArray, axes: int) -> FloatArray:
-        """Flatten a result's batch axes.
+    def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
+        """Flatten a result's batch axes; the last `own_axes` axes are not batch axes.
 
-        An unexpected shape raises OracleError.
+        Raises:
+            OracleError: the batch shape is not that of the arguments.
         """
-        own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
-        if result.shape != (*self.shape, *several, *own):
+        own_shape, frame_axis = (
+            result.shape[result.ndim - own_axes :],
+            () if self._is_one else (len(self.frames),),
+        )
+        if result.shape != (*self.shape, *frame_axis, *own_shape):
             raise OracleError(
                 "the batch shape of a result does not match that of the arguments", found=str(result.shape)
             )
-        return result.reshape(self.n, len(self.frames), *own)
+        return result.reshape(self.n, len(self.frames), *own_shape)
 
 
 def read_mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
@@ -581,10 +580,10 @@ def read_mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, 
 class Oracle:
     """A library's results in urdfkin's layout.
 
-    An oracle takes only names and sizes from `tree`.
-    Results have the shape (n, frames, ...).
+    An oracle takes only names and sizes from `tree`. Results have the shape (n, frames, ...).
 
     Args:
+        mimic: If False, mimic joints are independent joints.
         moving_base: A free-flyer moves the root.
         root_joint: Kind of an added root joint. The text does not contain this joint.
         lock: Values of locked joints, rad or m.
@@ -614,7 +613,7 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: the tree has other joints or another order.
+            OracleError: the tree has other joints or another order, or a mimic rule cannot be read.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -654,10 +653,7 @@ class Oracle:
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians in blocks.
-
-        Each block may overwrite the previous block.
-        """
+        """Yield the Jacobians in blocks. Each block may overwrite the previous block."""
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
@@ -677,11 +673,10 @@ class Oracle:
 def couple_columns(
     full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
 ) -> FloatArray:
-    """Return the product J_full G.
+    """Return the product J_full G. The kernel and NumPy return identical results.
 
-    The kernel and NumPy return identical results.
-    `columns` contains the column indices i of J_full, in the order of addition.
-    Column i, multiplied by `factor[i]`, is added to column `index[i]` of the product.
+    `columns` contains the column indices i of J_full, in the order of addition. Column i, multiplied by
+    `factor[i]`, is added to column `index[i]` of the product.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:

@@ -110,13 +110,12 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 #: Bytes of stack for each link.
 #: The parser of Pinocchio 4.1.0 needs less than 4 kB of stack per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
+#: Pinocchio reads chains with fewer joints than this number without a stack overflow, in any thread.
 _SAFE_DEPTH = 100
 #: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MAX_NV = 315
 
-#: Number of floating-point values in a block of results.
-#: A block of this size fits into the processor's cache.
+#: A block of results with this number of doubles (128 kB) fits into the processor's cache.
 _FLOATS_PER_BLOCK = 16384
 #: `compute(n)` returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
@@ -138,8 +137,11 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    Without enough memory or stack, Pinocchio would crash the process.
-    `lock` contains joint values in rad or m.
+    Without enough memory or stack, Pinocchio would crash the process. `lock` contains joint values in rad or
+    m. `lock_mimic_joints` also locks the mimic joints of these joints.
+
+    Raises:
+        OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -191,8 +193,7 @@ def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds all known causes of this error before Pinocchio reads the text.
-        # An error from Pinocchio at this point therefore has an unknown cause.
+        # `urdfkin check` finds all known causes before Pinocchio reads the text. This cause is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -226,8 +227,7 @@ class PinocchioOracle(Oracle):
             New joint indices and frame indices.
         """
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects links with the name of a joint.
-        # All joints and frames therefore get unique names.
+        # `appendModel` rejects links with the name of a joint, so all joints and frames get unique names.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -251,15 +251,17 @@ class PinocchioOracle(Oracle):
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
         return self._pin.ReferenceFrame.names[name]
 
-    def _convert_inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
-        """Convert the first `count` inputs to Pinocchio's vectors."""
-        q, *v_and_a = x.inputs[:count]
+    def _convert_inputs(self, x: QueryBatch, input_count: int) -> tuple[FloatArray, ...]:
+        """Convert the first `input_count` inputs to Pinocchio's vectors."""
+        q, *v_and_a = x.inputs[:input_count]
         full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:
             full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer_q(x.base)
         if self.moving_base and x.base is not None:
-            for rates, of_base in zip(full[1:], (free_flyer_velocity, free_flyer_acceleration), strict=False):
-                rates[:, :6] = of_base(x.base)
+            for rates, convert_base in zip(
+                full[1:], (free_flyer_velocity, free_flyer_acceleration), strict=False
+            ):
+                rates[:, :6] = convert_base(x.base)
         return tuple(full)
 
     # -- quantities ----------------------------------------------------------------------------------
@@ -280,10 +282,10 @@ class PinocchioOracle(Oracle):
     def accelerations(self, x: QueryBatch) -> FloatArray:
         return self._six_vectors(x, 3, self._pin.getFrameClassicalAcceleration)
 
-    def _six_vectors(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
+    def _six_vectors(self, x: QueryBatch, input_count: int, get: Callable[..., Any]) -> FloatArray:
         return self._collect_results(
             (6,),
-            self._convert_inputs(x, count),
+            self._convert_inputs(x, input_count),
             self._pin.forwardKinematics,
             lambda *arguments: get(*arguments).vector,
             self._find_ids(x),
@@ -307,11 +309,11 @@ class PinocchioOracle(Oracle):
             yield self._layout.couple(block)
 
     def _frame_jacobians(self, x: QueryBatch) -> _NextResults:
-        (one,), wanted = self._find_ids(x), self._convert_reference(x.reference)
-        found = self._map_configurations(
-            self._pin.computeFrameJacobian, self._convert_inputs(x, 1), one, wanted
+        (frame,), reference = self._find_ids(x), self._convert_reference(x.reference)
+        jacobians = self._map_configurations(
+            self._pin.computeFrameJacobian, self._convert_inputs(x, 1), frame, reference
         )
-        return lambda n: list(islice(found, n))
+        return lambda n: list(islice(jacobians, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
@@ -319,15 +321,15 @@ class PinocchioOracle(Oracle):
         return self._compute_columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
 
     def _compute_columns(
-        self, x: QueryBatch, count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
+        self, x: QueryBatch, input_count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
     ) -> FloatArray:
-        inputs, ids, wanted = (
-            self._convert_inputs(x, count),
+        inputs, ids, reference = (
+            self._convert_inputs(x, input_count),
             self._find_ids(x),
             self._convert_reference(x.reference),
         )
         return self._layout.couple(
-            self._collect_results((6, self._model.nv), inputs, compute, get, ids, wanted)
+            self._collect_results((6, self._model.nv), inputs, compute, get, ids, reference)
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
@@ -339,16 +341,16 @@ class PinocchioOracle(Oracle):
           axes.
         """
         pin, model, data = self._pin, self._model, self.data
-        ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
+        ids, reference, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
         out = np.zeros((len(x.q), len(ids), 6, nv, nv))
         moving = [(f, i) for f, i in enumerate(ids) if nv and model.frames[i].parentJoint]
         for to, q_k in zip(out, *self._convert_inputs(x, 1), strict=True):
             pin.computeJointJacobians(model, data, q_k)
             pin.computeJointKinematicHessians(model, data)
             for f, frame in moving:
-                numbers = pin.getFrameKinematicHessian(model, data, frame, wanted).ravel("K")
+                numbers = pin.getFrameKinematicHessian(model, data, frame, reference).ravel("K")
                 to[f] = numbers.reshape(nv, nv, 6).T
-        if wanted == pin.LOCAL:
+        if reference == pin.LOCAL:
             for joint in model.joints[1:]:
                 columns = slice(joint.idx_v, joint.idx_v + joint.nv)
                 out[..., columns, columns] = 0.0
@@ -356,11 +358,10 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the joint Jacobian's columns, including mimic joints."""
+        """Return the joint Jacobian (n, 6, columns) in WORLD, with mimic joints, without the base."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes for a Jacobian without columns.
-        # For one column, Pinocchio 4.1 returns a vector.
+        # Pinocchio 4.1 crashes for a Jacobian without columns. For one column, it returns a vector.
         for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -396,11 +397,8 @@ def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
 
 
 def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
-    """Yield results in blocks of `memory`.
-
-    Later blocks may overwrite earlier blocks.
-    Pinocchio 4.1 crashes the process for a Jacobian without columns.
-    """
+    """Yield results in blocks of `memory`. Later blocks may overwrite earlier blocks."""
+    # Pinocchio 4.1 crashes the process for a Jacobian without columns.
     if 0 in memory.shape:
         yield memory
         return
