@@ -107,22 +107,22 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link.
-#: The parser of Pinocchio 4.1.0 needs less than 4 kB of stack per link.
+#: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
 #: Pinocchio reads chains with fewer joints than this number without a stack overflow, in any thread.
 _SAFE_DEPTH = 100
-#: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
+#: Maximum nv of a robot, mimic joints included. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), so 2 GB
+#: at this limit.
 MAX_NV = 315
 
 #: A block of results with this number of doubles (128 kB) fits into the processor's cache.
 _FLOATS_PER_BLOCK = 16384
 #: `compute(n)` returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
+#: Name of the free-flyer's joint and frame.
 _BASE_NAME = "base"
 
-#: Prefix of link names while Pinocchio reduces a model.
-#: XML forbids U+0001, so no URDF name has this prefix.
+#: Prefix of link names while Pinocchio reduces a model. XML forbids U+0001, so no URDF name has this prefix.
 _LINK_PREFIX = "\x01"
 
 
