@@ -20,7 +20,7 @@ from tests.cli.running import urdfkin as run
 from tests.pages import pages
 from tests.reading import present
 from urdfkin.cli import cli
-from urdfkin.verify.quantities import QUANTITIES, compared_titles, uncompared_titles
+from urdfkin.verify.quantities import QUANTITIES, format_unvalidated_titles, format_validated_titles
 
 ROOT = Path(__file__).parents[1]
 DOCS = [f"docs/{page}" for page in pages()]
@@ -134,12 +134,12 @@ def test_the_texts_about_validation_list_the_quantities_of_the_table() -> None:
         shown,
         *(plain((ROOT / page).read_text("utf-8")) for page in ("docs/commands.md", "docs/ci.md")),
     ):
-        assert compared_titles() in text, text
-        assert uncompared_titles() in text, text
-    assert uncompared_titles() in plain((ROOT / "docs/known-limits.md").read_text("utf-8"))
+        assert format_validated_titles() in text, text
+        assert format_unvalidated_titles() in text, text
+    assert format_unvalidated_titles() in plain((ROOT / "docs/known-limits.md").read_text("utf-8"))
     named = [row for row in QUANTITIES.values() if row.object_kind == "frames"]
     assert {row.title for row in named} == {
-        *re.split(", | and ", f"{compared_titles()}, {uncompared_titles()}")
+        *re.split(", | and ", f"{format_validated_titles()}, {format_unvalidated_titles()}")
     }
 
 

@@ -13,7 +13,7 @@ from tests.cli.running import Done, refused
 from tests.report.documents import arms, failing, saved
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import SpeedEstimator, format_progress
-from urdfkin.cli.view import _line
+from urdfkin.cli.view import _make_line
 from urdfkin.robot.loading import load
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.collector import CampaignProgress
@@ -150,7 +150,7 @@ def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
 
 
 def test_a_line_between_two_random_configurations_moves_the_robot() -> None:
-    motion = _line(load("ur5"), "random", "random", 1.0, 3, 0, None)
+    motion = _make_line(load("ur5"), "random", "random", 1.0, 3, 0, None)
     assert not np.allclose(motion.q[0], motion.q[-1])
 
 

@@ -12,7 +12,7 @@ from urdfkin.comparison.result import Interval
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
-from urdfkin.verify.exact.numbers import DIGITS, precision, read_exact_joints
+from urdfkin.verify.exact.numbers import REFERENCE_DIGITS, precision, read_exact_joints
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.quantities import PLACEMENT
 
@@ -28,7 +28,7 @@ def placed(robot: Robot, q: FloatArray, frame: str) -> list[Any]:
 
 def far(a: Robot, b: Robot, q_a: FloatArray, q_b: FloatArray, interval: Interval) -> float:
     """Return the distance (m) between a frame's positions in A and B, at fifty digits."""
-    with precision(DIGITS):
+    with precision(REFERENCE_DIGITS):
         places = placed(a, q_a, interval.frame), placed(b, q_b, interval.frame_b)
         return math.hypot(*(float(x - y) for x, y in zip(*places, strict=True)))
 

@@ -85,6 +85,16 @@ def test_a_table_with_a_first_axis_close_to_the_x_axis_is_within_the_tolerance(
             assert (off <= table.tolerance(q)[1]).all()
 
 
+@pytest.mark.parametrize("turns", [1e2, 1e4])
+def test_the_tolerance_covers_the_rounding_of_large_angles(turns: float) -> None:
+    tree = arm(
+        rotation("z", 0.3), shift(0.4, 0, 0.1) @ rotation("x", 1.1), shift(0.3, 0.2, 0) @ rotation("y", 0.7)
+    )
+    path, table = make_chain(tree, "tip", "l0"), make_dh_table(tree, "tip", "l0")
+    q = np.random.default_rng(5).uniform(-turns, turns, (200, 3)) * math.tau
+    assert error_ratio(table, table.placement(q), path.placement(q), q) <= 1.0
+
+
 @pytest.mark.slow
 @given(trees(min_joints=1))
 @settings(max_examples=30)

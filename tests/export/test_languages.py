@@ -566,9 +566,10 @@ def test_the_check_refuses_a_file_that_urdfkin_export_did_not_write(tmp_path: Pa
 
 @pytest.mark.slow
 def test_the_check_accepts_each_suffix_that_selects_a_compiled_language(tmp_path: Path) -> None:
-    suffixes = {suffix for suffix, to in _LANGUAGES_OF_SUFFIXES.items() if to in ("cpp", "cuda")}
-    assert suffixes | {".c"} == set(_COMPILE_COMMANDS)
-    for suffix in (".cc", ".cu"):
+    compiled = {"c", "cpp", "cuda"}
+    suffixes = {suffix for suffix, names in _LANGUAGES_OF_SUFFIXES.items() if compiled & {*names}}
+    assert suffixes == set(_COMPILE_COMMANDS)
+    for suffix in (".h", ".cc", ".cu"):
         path = tmp_path / f"arm{suffix}"
         good("export", "planar_two_link", "--quantity", "placement", "-o", str(path))
         assert check(path).verified

@@ -72,7 +72,7 @@ def patch(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     def ask(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[str, Any]], str]:
         return json.loads(json.dumps(list(mjcf_process.compute_answers(request)))), "ended"
 
-    monkeypatch.setattr(mjcf_check, "_ask_process", ask)
+    monkeypatch.setattr(mjcf_check, "_request_answers", ask)
     return monkeypatch
 
 

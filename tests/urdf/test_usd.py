@@ -881,7 +881,7 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
     return loaded(path)
 
 
-@pytest.mark.parametrize("mistake", ["unit", "degrees", "swapped", "axis"])
+@pytest.mark.parametrize("mistake", ["unit", "degrees", "swapped", "axis", "no limits"])
 def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
     write: Write, monkeypatch: pytest.MonkeyPatch, mistake: str
 ) -> None:
@@ -897,7 +897,7 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
 
     def wrong_motion(self: Any, prim: Any) -> Any:
         kind, axis, (lower, upper), free = motion(self, prim)
-        factor = 180.0 / math.pi if mistake == "degrees" else 1.0
+        factor = {"degrees": 180.0 / math.pi, "no limits": math.inf}.get(mistake, 1.0)
         return kind, axis, (lower * factor, upper * factor), "rotX" if mistake == "axis" else free
 
     monkeypatch.setattr(usd._StageReader, "_read_joint_frame", wrong_side)

@@ -139,7 +139,8 @@ def test_equal_seeds_give_equal_studies() -> None:
 
 
 def test_the_digits_of_true_values_grow_with_joints_before_a_link(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 digits are for 200 joints
+    # 15 digits are too few for 20 joints, as 50 digits are for 200 joints.
+    monkeypatch.setattr(accuracy, "REFERENCE_DIGITS", 15)
     check_errors(accuracy_study(urdfkin.load(make_pages.make_askew_chain(20), verify=False), samples=1))
 
 

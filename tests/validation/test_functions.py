@@ -24,10 +24,12 @@ from tests.urdfs import robot as robot_text
 from urdfkin.model.conventions import find_convention
 from urdfkin.report.junit import function_checks_as_junit
 from urdfkin.robot import Robot
+from urdfkin.validation import functions
 from urdfkin.validation.diagnosis import _SWAPPED_HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
 from urdfkin.validation.programs import Program, ProgramError
 from urdfkin.verify.quantities import recursive_quantities
+from urdfkin.verify.verifier import compute_oracle_results_with_bound
 
 #: Robots with a frame: arms, a quadruped, and grippers with mimic joints.
 FRAMES = {
@@ -52,6 +54,19 @@ def computed(robot: Robot, quantity: str, frame: str, reference: str | None = No
     method = getattr(robot, quantity.replace(" ", "_"))
     named = {} if quantity == "placement" else {"reference": reference or "local_world_aligned"}
     return lambda *inputs: method(*inputs, frame, verify=False, **named)
+
+
+@pytest.mark.parametrize("k", [0.0, -1.0, np.inf, np.nan])
+def test_no_function_agrees_within_an_invalid_bound(k: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = robot_of("ur5")
+
+    def with_factor(*args: Any) -> Any:
+        results, bound = compute_oracle_results_with_bound(*args)
+        return results, replace(bound, k=np.full_like(bound.k, k))
+
+    monkeypatch.setattr(functions, "compute_oracle_results_with_bound", with_factor)
+    found = verify_function(computed(robot, "placement", "tool0"), robot, "placement", samples=3)
+    assert (found.agrees, found.bound_ratio) == (False, np.inf)
 
 
 def check(

@@ -505,6 +505,16 @@ def test_status_lists_finished_failed_and_missing_chunks(tmp_path: Path) -> None
     assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
 
 
+def test_status_reports_a_damaged_chunk_and_estimates_no_time_from_it(tmp_path: Path) -> None:
+    interrupt(tmp_path, 1)
+    (only,) = files(tmp_path)
+    only.write_bytes(b"")
+    found = run("report status", str(tmp_path))
+    assert found.code == 3, found.err
+    assert "is damaged and is computed again" in found.err
+    assert "remaining: " not in found.text
+
+
 def test_status_names_the_process_of_a_running_shard(tmp_path: Path) -> None:
     interrupt(tmp_path, 2)
     manifest = Store.open_read_only(tmp_path, print).manifest

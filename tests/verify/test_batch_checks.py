@@ -16,7 +16,7 @@ from urdfkin.verify import pinocchio, verifier
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
-from urdfkin.verify.verifier import SAMPLE, Verify, split_into_parts
+from urdfkin.verify.verifier import SAMPLE_SIZE, Verify, split_into_parts
 
 #: Numbers of values in a part: of one configuration, of a few, and of all.
 SIZES = (1, 200, 10**9)
@@ -68,7 +68,7 @@ def fresh(panda: Robot) -> Robot:
 @pytest.fixture
 def lies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add a relative error of 1e-6 to Pinocchio's results at `MARK`, and a larger error beyond `MARK`."""
-    right = verifier.oracle_results
+    right = verifier.compute_oracle_results
 
     def wrong(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
         theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
@@ -82,8 +82,8 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
         theirs = wrong(*asked)
         return (theirs[i : i + 5] for i in range(0, len(theirs), 5))
 
-    monkeypatch.setattr(verifier, "oracle_results", wrong)
-    monkeypatch.setattr(verifier, "oracle_blocks", wrong_in_blocks)
+    monkeypatch.setattr(verifier, "compute_oracle_results", wrong)
+    monkeypatch.setattr(verifier, "yield_oracle_blocks", wrong_in_blocks)
 
 
 BATCHES = [
@@ -178,7 +178,7 @@ def test_with_sample_a_part_of_a_large_batch_is_checked_and_the_rest_counted_as_
     certificate = fresh.certificate()
     for line in certificate.lines:
         of = {"placement": 3, "acceleration": 3}.get(line.quantity, 1)
-        assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)
+        assert (line.checked, line.unchecked) == (SAMPLE_SIZE * of, (250 - SAMPLE_SIZE) * of)
         assert line.worst > 0.0
         assert 0.0 < line.bound_ratio < 1.0
     assert len(certificate.lines) == 6
@@ -186,7 +186,7 @@ def test_with_sample_a_part_of_a_large_batch_is_checked_and_the_rest_counted_as_
     assert certificate.not_verified == ('verify="sample" checks 100 configurations of a call',)
 
 
-@pytest.mark.parametrize("n", [0, 1, 99, SAMPLE])
+@pytest.mark.parametrize("n", [0, 1, 99, SAMPLE_SIZE])
 def test_with_sample_a_small_batch_is_checked_completely(fresh: Robot, n: int) -> None:
     fresh.jacobian(fresh.sample(n, 1), "panda_hand", verify="sample")
     certificate = fresh.certificate()
@@ -203,7 +203,7 @@ def test_the_checked_sample_is_deterministic_distinct_and_spread_over_the_batch(
         for _ in range(2)
     )
     assert drawn == again == sorted(drawn)
-    assert len(set(drawn)) == SAMPLE
+    assert len(set(drawn)) == SAMPLE_SIZE
     assert drawn[0] < n // 10
     assert drawn[-1] >= n - n // 10
 
@@ -211,7 +211,7 @@ def test_the_checked_sample_is_deterministic_distinct_and_spread_over_the_batch(
 @pytest.mark.parametrize("numbers", [0, 1, 48, 10**7])
 @pytest.mark.parametrize("n", [0, 1, 5000])
 def test_the_parts_of_a_complete_check_contain_each_configuration_once(n: int, numbers: int) -> None:
-    choices: tuple[Verify, ...] = (True, "sample") if n <= SAMPLE else (True,)
+    choices: tuple[Verify, ...] = (True, "sample") if n <= SAMPLE_SIZE else (True,)
     for verify in choices:
         indices = [i for part in split_into_parts(verify, n, numbers) for i in np.arange(n)[part].tolist()]
         assert indices == list(range(n))
@@ -243,7 +243,7 @@ def test_a_call_can_override_the_option_verify_of_the_robot() -> None:
     robot.placement(q[0], "tool0")
     robot.placement(q[0], "tool0", verify=False)
     (line,) = robot.certificate().lines
-    assert (line.checked, line.unchecked) == (SAMPLE + 103 + 1, 3 + 1)
+    assert (line.checked, line.unchecked) == (SAMPLE_SIZE + 103 + 1, 3 + 1)
     assert robot.certificate().not_verified == (
         "the check was turned off by verify=False",
         'verify="sample" checks 100 configurations of a call',
@@ -266,10 +266,10 @@ def test_an_oracle_that_returns_results_of_too_few_or_too_many_configurations_is
     count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = urdfkin.load("planar_two_link")
-    q, right = robot.sample(5), verifier.oracle_results
+    q, right = robot.sample(5), verifier.compute_oracle_results
     rows = np.arange(count) % 5
-    monkeypatch.setattr(verifier, "oracle_results", lambda *asked: right(*asked)[rows])
-    monkeypatch.setattr(verifier, "oracle_blocks", lambda *asked: iter([right(*asked)[rows]]))
+    monkeypatch.setattr(verifier, "compute_oracle_results", lambda *asked: right(*asked)[rows])
+    monkeypatch.setattr(verifier, "yield_oracle_blocks", lambda *asked: iter([right(*asked)[rows]]))
     for compute in (robot.placement, robot.jacobian):
         with pytest.raises(OracleError, match=rf"each configuration: found {count} of 5 results"):
             compute(q, "tip")

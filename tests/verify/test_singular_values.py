@@ -1,6 +1,7 @@
 """Singular values with fifty digits lie within the bounds; a singular Jacobian is explained."""
 
 import pickle
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -22,7 +23,12 @@ from urdfkin.robot import Robot
 from urdfkin.verify.exact.numbers import precision, read_exact_joints
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.quantities import JACOBIAN
-from urdfkin.verify.singular_values import BoundedArray, SingularValues, _orthogonality_error, singular_values
+from urdfkin.verify.singular_values import (
+    BoundedArray,
+    SingularValues,
+    _bound_orthogonality_error,
+    singular_values,
+)
 from urdfkin.verify.singularity import FrameJacobian, Singularity
 
 exact = np.vectorize(mp.mpf, otypes=[object])
@@ -207,9 +213,20 @@ def test_bounds_of_singular_values_include_underflow_of_products(monkeypatch: py
     assert values.lower[0] <= 1600 * least <= values.upper[0]
 
 
+def test_bounds_of_singular_values_include_the_rounding_of_long_sums_in_a_batch() -> None:
+    # NumPy adds the squares of a batch one after the other, and 1 + x^2 is rounded to 1.
+    x = 0.7 * 2.0**-26
+    error = np.full((40, 1, 6000), x)
+    error[..., 0] = 1.0
+    upper = singular_values(np.zeros(error.shape), error, np.ones(6000, dtype=bool)).values.upper
+    assert all(Fraction(float(one)) ** 2 >= 1 + 5999 * Fraction(x) ** 2 for one in upper.ravel())
+
+
 def test_the_measure_of_orthogonality_includes_the_rounding_of_the_product() -> None:
     # Each number of the product of 3 by 3 matrices has the error bound 5 eps.
-    assert _orthogonality_error(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
+    assert _bound_orthogonality_error(np.eye(3)) == pytest.approx(
+        5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0
+    )
 
 
 def test_bounds_of_singular_values_and_products_are_rounded_outward() -> None:

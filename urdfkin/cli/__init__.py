@@ -80,7 +80,10 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
             "models",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
-        "vectors": ("export", "Write test vectors for other programs: robots and results at 50 digits."),
+        "vectors": (
+            "export",
+            "Write test vectors for other programs: robots, and results computed at 50 digits.",
+        ),
         "report": ("reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
@@ -112,7 +115,7 @@ def _invert_table(table: dict[str, str]) -> dict[str, str]:
 
 #: Suggested commands for words that are not commands.
 #: For example, urdfkin suggests `placement` for the word "fk".
-#: Each key is the suggested command, and the value lists the words.
+#: In the argument, each key is a suggested command, and its value lists the words.
 _SYNONYMS = _invert_table(
     {
         "--help": "help usage man",

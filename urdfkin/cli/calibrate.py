@@ -112,16 +112,18 @@ def calibrate_command(
     """Fit the parameters of ROBOT to measured poses, and write the calibrated robot to a new file.
 
     The new URDF differs from that of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at the
-    measured configurations. If ROBOT is the file of a Denavit-Hartenberg table, the command fits the numbers
-    of the table. If neither --poses nor --ur is given, the command lists which parameters are identifiable in
-    principle.
+    measured configurations. With --ur, the configurations of this check are random. If ROBOT is the file of a
+    Denavit-Hartenberg table, the command fits the numbers of the table. Pinocchio checks the new table in the
+    zero configuration. If neither --poses nor --ur is given, the command lists which parameters are
+    identifiable in principle.
 
     The command refuses a calibration that is not plausible, and prints the likeliest cause. Possible causes
     are joint angles in degrees, a joint with the wrong sign, or joint values that belong to another pose.
     With --force, the command writes the calibration nevertheless. If the joint values look like degrees,
     --radians is also needed.
 
-    Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
+    Exit 0: verified, or only a list of parameters. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or
+    refused.
     """
     from urdfkin.report.calibration import as_data, displacement_table, document
     from urdfkin.report.diff import lines_of

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 #: Minimum time (s) between two lines about the progress.
 #: `_LINE_INTERVAL` is for lines of text, `_JSON_INTERVAL` for lines of JSON.
+#: The last line of JSON is printed at once.
 _LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 
 
@@ -44,7 +45,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # Time before this run's first finished chunk is not counted: urdfkin may compile kernels.
+        # The time until the last call without a new chunk is not counted: urdfkin may compile kernels.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:
@@ -171,7 +172,7 @@ def status(context: click.Context, folder: Path) -> None:
     folder, so it is fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all
     files.
 
-    Exit 0: complete. 3: a robot is missing or failed.
+    Exit 0: complete. 3: results are missing, or a robot failed.
     """
     from urdfkin.validation.store import Store
 
@@ -232,7 +233,9 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
     seconds = []
     for robot in begun[:: max(1, len(begun) // _MAX_TIMED_CHUNKS)][:_MAX_TIMED_CHUNKS]:
         answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
-        seconds += [next(answer.seconds for answer in answers if isinstance(answer, ChunkResult))]
+        # A damaged file is counted in `counts`, but has no result.
+        if (one := next((x.seconds for x in answers if isinstance(x, ChunkResult)), None)) is not None:
+            seconds.append(one)
     return sum(seconds) / len(seconds) if seconds else None
 
 

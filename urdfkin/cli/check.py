@@ -65,16 +65,16 @@ class CheckOutcome:
     Attributes:
         silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
             comment.
-        excerpts: Excerpt of the file for each finding. An excerpt has the faulty line, and a line with carets
-            below the fault.
+        excerpts: Excerpt of the file for each finding; None if the finding marks no text. An excerpt has the
+            faulty line, and a line with carets below the fault.
         known_count: Number of findings that the baseline file suppresses.
         obsolete_count: Number of findings that the baseline file lists, but that the checked files no longer
             have.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
-        files_with_errors: Files with a finding of severity error. --fix does not change these files. A
-            warning that --strict reports as an error does not count.
-        unwritable: Names of texts that --fix cannot write: standard input, an expanded .xacro file, and a
-            robot of the catalogue.
+        files_with_errors: Files with a reported finding of severity error. --fix does not change these files.
+            A warning that --strict reports as an error does not count.
+        unwritable: Names of texts that --fix cannot write: standard input, a pipe, an expanded .xacro file,
+            and a robot of the catalogue.
     """
 
     files: list[str] = field(default_factory=list)
@@ -391,7 +391,7 @@ class CheckRun:
     """One check of many files.
 
     Attributes:
-        fold: Whether findings with the same code share a line of output.
+        fold: Whether many findings with the same code share a line of output; see `urdfkin.check`.
         writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
     """
@@ -476,8 +476,8 @@ class CheckRun:
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
         """Return whether a file and its included files are the same as in `commit_files`.
 
-        Every file of the commit with a suffix in `suffixes` counts as an included file. A file that was
-        deleted after the commit also counts if the deleted file's name occurs in the checked file.
+        Every file of the commit with a suffix in `suffixes` counts as an included file. Return False if the
+        checked file contains the name of a file that was deleted after the commit.
         """
         if suffixes not in self._has_changes:
             self._has_changes[suffixes] = commit_files.has_changes(suffixes)
@@ -530,7 +530,6 @@ class CheckRun:
 
 
 def _find_writable_path(text: UrdfText) -> Path | None:
-    """Return the path of the file that --fix can change; None if there is no such file."""
     return None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
 
 

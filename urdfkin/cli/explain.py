@@ -44,7 +44,7 @@ def find_answer(topic: str) -> str | None:
 
 
 def format_answer(answer: str) -> str:
-    """Format a section for a terminal, with the setup code of its examples at the end."""
+    """Format a section for a terminal; the setup code of Python examples is at the end."""
     pieces = _CODE_BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
@@ -66,10 +66,7 @@ def make_anchor(heading: str) -> str:
 
 
 def _question_sections() -> list[str]:
-    """Split docs/questions.md at its headings.
-
-    The first section has the setup code of all examples.
-    """
+    """Split docs/questions.md at its headings; the first part has the setup code of all examples."""
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 

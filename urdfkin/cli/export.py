@@ -41,7 +41,7 @@ from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
 
-#: Languages that a file with this suffix may contain; without --to, the first one.
+#: Languages that a file with each suffix may contain. Without --to, the first language is chosen.
 _LANGUAGES_OF_SUFFIXES = {
     **dict.fromkeys((".c", ".h"), ("c",)),
     **dict.fromkeys((".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx"), ("cpp",)),
@@ -197,7 +197,9 @@ def vectors_command() -> None:
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
 @answer_command()
 def write_vectors(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
-    """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
+    """Write test vectors into the folder DIR: inputs and results, with a tolerance for every result.
+
+    The results are computed at 50 digits, and written with 17 digits.
 
     If you name one or more robots, the command writes only the test vectors of the named robots. If you name
     no robot, the command writes test vectors of the robots of the catalogue and of some 70 small robots. Each

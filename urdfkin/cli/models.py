@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: Options of `urdfkin same` that do nothing with --recheck: they affect only a new comparison.
+#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck itself.
+#: With --recheck, the other options of this tuple are errors.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
 #: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
 #: `urdfkin diff` rejects a revision, unless a file has this name.
@@ -226,9 +227,10 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
     For each changed joint, the command prints the frame that the changes of this joint move farthest. The
-    printed distance is this frame's largest displacement in all configurations within the joint limits. OLD
-    and NEW have the same joint coordinates in each configuration. The last line of the output states how far
-    all changes together move the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the
+    command also prints this frame's largest displacement in all configurations within the joint limits. If
+    the changes only rotate frames, the command prints the largest rotation. OLD and NEW have the same joint
+    coordinates in each configuration. The last line of the output states how far all changes together move
+    the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the
     changes are the differences that `urdfkin same` finds. If you name more than two robots, the command
     compares each pair.
 

@@ -64,9 +64,9 @@ def format_from_suffix(
 ) -> str:
     """Return the output format that an option or the suffix of the output file selects.
 
-    The option is --format, or the one whose value is `context.params[parameter]`. Raise InputError if the
-    option contradicts the suffix. `formats` lists the formats of each suffix, the default first:
-    `{".py": ("numpy", "sympy")}`.
+    `parameter` is the name of the option's value in `context.params`. `formats` lists the formats of each
+    suffix, for example `{".py": ("numpy", "sympy")}`. The first format is the default. Raise InputError if
+    the option contradicts the suffix. Without the option, an unknown suffix is an InputError too.
     """
     format_: str = context.params[parameter] or default_format
     if output is None:
@@ -431,11 +431,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def disabled_options(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that disable options for file types other than that of `source`.
-
-        If another source is a xacro file but `source` is not, the xacro options are disabled for `source`.
-        The same rule applies to USD files and USD options.
-        """
+        """Disable the xacro options if only other sources are xacro files; the same for USD options."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -460,7 +456,7 @@ def read_inputs(
     """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
     If one of the arrays has several samples, single samples of the other arrays are repeated. `option` is the
-    option that gives q. The caller checks --seed if the command has several such options.
+    option that gives q. If `option` is not --q, the caller must reject an unused --seed.
     """
     import numpy as np
 
@@ -478,11 +474,7 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return arrays with equal numbers of rows.
-
-    An array with one row is repeated to the length of the longest array. Raise InputError if an array with
-    several rows is shorter than the longest array.
-    """
+    """Repeat each array with one row to the length of the longest array; reject other lengths."""
     import numpy as np
 
     n = max(map(len, batches))

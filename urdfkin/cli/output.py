@@ -167,7 +167,7 @@ def report_compilation() -> Iterator[None]:
 
 
 def make_console(*, err: bool = False) -> Console:
-    """Return a console; for a pipe, the environment variable COLUMNS sets the width."""
+    """Return a console; if the stream is no terminal, the environment variable COLUMNS sets the width."""
     from urdfkin.cli.terminal import Terminal
 
     stream = sys.stderr if err else sys.stdout

@@ -58,7 +58,7 @@ from urdfkin.verify.quantities import (
     PLACEMENT,
     SIX_VECTOR_LABELS,
     Quantity,
-    replay_line,
+    format_replay_command,
 )
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _format_samples(
 
 _ROBOT_HELP = (
     "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may"
-    " also be a Denavit-Hartenberg table: .toml, .json or .csv."
+    " also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
 )
 _breakdown_option = click.option(
     "--breakdown",
@@ -240,15 +240,15 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         rates = [csv_cell(name) for name in x.velocity_names]
         # In a Hessian's CSV, each line has the derivatives of one Jacobian entry.
         keys = [[row] for row in quantity.labels]
-        for _ in range(2, quantity.axes):
+        for _ in range(2, quantity.ndim):
             keys = [[*key, rate] for key in keys for rate in rates]
-        yield ["sample", "row", *["column"] * (quantity.axes - 2), *rates]
+        yield ["sample", "row", *["column"] * (quantity.ndim - 2), *rates]
         for k, J in enumerate(result.reshape(len(result), len(keys), len(rates)).tolist()):
             yield from ([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
     else:
         names = list(quantity.labels) or [f"T{i}{j}" for i in range(4) for j in range(4)]
         if quantity.has_columns:
-            several = product(names, *[x.velocity_names] * (quantity.axes - 1))
+            several = product(names, *[x.velocity_names] * (quantity.ndim - 1))
             names = [csv_cell(" ".join(words)) for words in several]
         yield [_SAMPLE_HEADINGS[x.t is not None], *names]
         samples = zip(_sample_cells(x), result.reshape(len(result), -1).tolist(), strict=True)
@@ -288,7 +288,7 @@ def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: Floa
     """
     import numpy as np
 
-    if quantity.axes == len(("row", "rate")):
+    if quantity.ndim == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
     seen = np.abs(value).max(axis=0, initial=0.0) > NOISE_FRACTION * np.abs(value).max(initial=0.0)
     pairs = zip(*np.nonzero(seen), strict=True)
@@ -382,7 +382,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
     rotation as T.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may
-    also be a Denavit-Hartenberg table: .toml, .json or .csv.
+    also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
@@ -420,7 +420,7 @@ def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> Floa
 
 
 def _replay_command(x: Inputs, k: int, form: str) -> str:
-    line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
+    line = format_replay_command(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     options = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
         if options[name] is not None:
@@ -428,7 +428,8 @@ def _replay_command(x: Inputs, k: int, form: str) -> str:
     return f"{line} --as {form}"
 
 
-#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
+#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES` in small letters.
+#: The import of that module would slow --help down.
 _EULER_SEQUENCES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = (
     "rpy",

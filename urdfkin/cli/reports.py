@@ -176,13 +176,14 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     Each of these changes is a regression:
     - The run passed before and fails now, or it was interrupted now.
     - A robot is missing, its verdict is worse, or it is new and not verified.
-    - More results are outside their bound.
+    - More results are outside their bound, or results of a new quantity are.
     - A quantity or table is no longer compared, or there are fewer samples or results.
     - A bound is wider for the same joints.
     - The largest disagreement of a quantity grew by more than --factor,
       and is above 2 eps*scale (the error of a single rounding).
     - The largest ratio of a disagreement to its bound grew by more than
       --factor, and is above 0.1.
+    - The largest disagreement or ratio became infinite.
 
     If a model changed, the command lists the changes of each joint. A changed model alone is not a
     regression; `urdfkin same` and `urdfkin diff` compute how far the model's frames move.

@@ -171,11 +171,9 @@ def _orders(robot: Robot) -> Answer:
 
 
 def _index_cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return one text for each joint: the indices of the joint in q and v.
+    """Return the indices of each joint as text, for example "7", "7-13", or "-" for none.
 
-    The text is the joint's index in q, for example "7", or the joint's first and last index, "7-13". If the
-    index in v differs, the text contains both: "7/6" means index 7 in q and index 6 in v. The text is "-" if
-    the convention has no index for the joint.
+    "7/6" means index 7 in q and index 6 in v. Otherwise, the indices in q and v are equal.
     """
     indices = conversion.q_and_v_indices
 

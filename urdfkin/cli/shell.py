@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
 #: Pattern of the names that completion offers.
-#: Names without characters that a shell interprets.
+#: These names contain no character that a shell interprets.
 #: Bash separates words at colons, so names with colons do not match.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
@@ -121,7 +121,7 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 
 @click.command(epilog="Example: urdfkin warm")
 def warm_command() -> None:
-    """Compile all kernels (machine code for batches) and store them, for container images and CI.
+    """Compile all kernels (machine code) and store them, for container images and CI.
 
     Without this command, urdfkin compiles a kernel when computations without the kernel take too long, for
     example for a large batch. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.

@@ -172,10 +172,7 @@ class SafeStream:
         self.stream.write(text)
 
     def _escape_commands(self, text: str) -> str:
-        """Escape CI commands in `text`.
-
-        An earlier call may have written the first characters of a CI command. The rest is then in `text`.
-        """
+        """Escape CI commands in `text`; an earlier call may have written the beginning of a command."""
         first, *rest = text.split("\n")
         lines = [self._escape_commands_in_line(first)]
         for line in rest:
@@ -190,8 +187,8 @@ class SafeStream:
             m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
         ]
         # Only the last 16 characters of a long line are stored.
-        # An "x" is added in front of the characters.
-        # Without the "x", a line could begin with a CI command.
+        # An "x" in front of the characters stands for the rest of the line.
+        # Without the "x", "::" in the characters could look like the beginning of the line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (
@@ -225,7 +222,7 @@ def join_lines(text: str) -> str:
 
 
 def say(line: str, *, err: bool = False) -> None:
-    """Print one line with escaped control characters."""
+    """Print one line; escape control characters and line ends in `line`."""
     click.echo(escape_unprintable(line), err=err)
 
 

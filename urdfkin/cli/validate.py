@@ -31,7 +31,7 @@ from urdfkin.errors.display import format_count
 from urdfkin.system.files import is_folder
 from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf.catalogue import catalogue, example_robot_data_names
-from urdfkin.verify.quantities import compared_titles, uncompared_titles
+from urdfkin.verify.quantities import format_unvalidated_titles, format_validated_titles
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -138,7 +138,9 @@ _T = TypeVar("_T", bound=click.Command)
 
 def _list_quantities_in_help(command: _T) -> _T:
     assert command.help is not None
-    command.help = command.help.format(compared=compared_titles(), not_compared=uncompared_titles())
+    command.help = command.help.format(
+        compared=format_validated_titles(), not_compared=format_unvalidated_titles()
+    )
     return command
 
 
@@ -302,10 +304,7 @@ def _list_urdf_files(robot: str) -> list[str]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load the robot from standard input if `source` is "-"; otherwise return `source`.
-
-    Standard input can be read only once.
-    """
+    """Load the robot now if `source` is standard input, which can be read only once."""
     from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source

@@ -214,7 +214,7 @@ def plot_command(
     if trajectory is not None:
         trajectory_ = read_motion(loaded, trajectory, convention)
     else:
-        trajectory_ = _line(loaded, start, end or "", duration, samples, seed, convention)
+        trajectory_ = _make_line(loaded, start, end or "", duration, samples, seed, convention)
     with report_compilation():
         motion = frame_motion(loaded, trajectory_, frame or loaded.tip_frame, reference)
     write_file(output, figure_bytes(plot_motion(loaded, motion, trajectory_, panels), output))
@@ -222,7 +222,7 @@ def plot_command(
     context.exit(3 if motion.unverified_reason is not None else 0 if motion.agrees else 1)
 
 
-def _line(
+def _make_line(
     robot: Robot, start: str, end: str, duration: float, samples: int, seed: int, convention: str | None
 ) -> Trajectory:
     from urdfkin.robot.trajectory import make_line_trajectory

@@ -95,8 +95,8 @@ def find_axis_transform(
 
     Tilts and lengths within `noise` become zero.
     `default_phi` is used if the axes do not determine phi.
-    For parallel axes, `delta_next` is the offset along the axes, and `delta` is 0.
-    With `offset_in_delta`, `delta` is this offset, and `delta_next` is 0.
+    For parallel axes, `delta_next` is the offset along the next axis, and `delta` is 0.
+    With `offset_in_delta`, `delta` is the offset along the first axis, and `delta_next` is 0.
     `reach` is the length of the path (m).
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
@@ -138,7 +138,10 @@ def _find_parallel_transform(
 def find_hayati_transform(
     A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float
 ) -> AxisTransform:
-    """The x axis points to the intersection of the next axis with the xy plane."""
+    """Return a Hayati row's transform.
+
+    The x axis points to the intersection of the next axis with the xy plane.
+    """
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
@@ -163,6 +166,7 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
     """Remove rounding errors from a length.
 
     `reach` is the largest length in the computation (m).
+    Lengths up to `noise` (m) become 0.
 
     >>> clean_length(-5e-17, 1.0), clean_length(0.07599999999999998, 1.0), clean_length(-5e-12, 1.0)
     (0.0, 0.076, -5e-12)
@@ -178,7 +182,7 @@ class PairWithReference:
     """Two consecutive joint axes, and the first joint's row in a reference table.
 
     `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
-    The argument `delta_in` is the offset from the DH frame to the joint's frame (m).
+    The argument `delta_in` of the methods is the offset from the DH frame to the joint's frame (m).
     """
 
     A: FloatArray
@@ -317,8 +321,8 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    Exception: prismatic joints i + 1 to k follow a revolute joint i or row 0.
-    Let k be the first of them whose phi the axes determine.
+    Exception: i is 0 or joint i is revolute, and prismatic joints i + 1 to k follow.
+    The axes determine phi of row k, but not of rows i + 1 to k - 1.
     Then theta of rows i + 1 to k equals the reference.
     """
     own = pairs[i].row.theta - phi_in

@@ -132,7 +132,9 @@ def make_dh_table(
         first: "base": d_1 and theta_1 contain the translation along the first axis and the rotation about
             this axis. "joint": d_1 and theta_1 are 0, and the base transform contains this motion (Craig's
             frame 0).
-        sign: Direction of x. "theta": |theta| <= pi/2. "a": a >= 0. "alpha": alpha >= 0.
+        sign: Direction of x, except in the last row, where the tip determines x. "theta": |theta| <= pi/2.
+            "a": a >= 0; if a is 0, alpha >= 0. "alpha": alpha >= 0; if alpha is 0, a >= 0. If a and alpha
+            are 0, the rule for "theta" applies.
         slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
             The first joint's axis passes through the base's origin instead. The last joint's axis passes
             through the tip if a standard table then needs no tool. With near_parallel="strict", an axis
@@ -147,8 +149,9 @@ def make_dh_table(
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
-        InputError: an option is invalid or excluded by `like`, or a joint is planar or floating.
-        RangeError: a coordinate of a joint's origin in the URDF is above 1e150 m.
+        InputError: an option is invalid or excluded by `like`, `like` describes a different robot, or a joint
+            is planar or floating.
+        RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
     """
     exact = make_chain(tree, tip, base)
     # The whole path from the root is checked, because Pinocchio computes poses relative to the root.

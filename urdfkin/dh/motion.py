@@ -88,11 +88,7 @@ def _joint_derivatives(table: DHTable, rates: ConfigurationLike, what: str) -> F
 
 
 def _flatten(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Flatten the batch axes.
-
-    Returns:
-        The common batch shape, and arrays (number of configurations, rows).
-    """
+    """Return the common batch shape, and arrays (number of configurations, rows)."""
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)
     flat = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]

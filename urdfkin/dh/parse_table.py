@@ -101,10 +101,11 @@ def find_table_in_text(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table.
+    """Content of a heading.
 
     Attributes:
-        name: Known name, otherwise "".
+        name: Standard name of the column; "" for an unknown heading.
+        heading: The heading without unit and index, in lower case.
         previous: Whether the heading has the index i-1.
     """
 
@@ -222,7 +223,6 @@ def _parse_bars(lines: list[str]) -> _Grid | None:
 
 
 def _parse_separated(lines: list[str]) -> _Grid | None:
-    """Parse cells separated by semicolons, tabs or commas."""
     lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
     grids = (
         _find_grid(lines, partial(_split_csv_line, separator=separator), separator)
@@ -292,12 +292,7 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """Find the convention.
-
-    Returns:
-        "modified" if a heading has the index i-1. Otherwise the convention that the text names; None if the
-        text names no convention or both.
-    """
+    """A heading with the index i-1 means "modified". A text with the names of both conventions gives None."""
     if any(column.previous for column in grid.columns):
         return "modified"
     text = "\n".join(map(to_plain_text, grid.other_lines))
@@ -452,6 +447,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
     Raises:
         SourceError: the file cannot be read.
         InputError: the suffix, the syntax or the table is invalid.
+        UnknownNameError: a mimicked joint has no row and is not in `coordinates`.
 
     >>> import urdfkin
     >>> table = urdfkin.read_table("robots/dh/ur5.toml")

@@ -381,7 +381,7 @@ def table_from_rows(
         coordinates: Names of mimicked joints without a row.
 
     Raises:
-        InputError: a unit, the convention or a row is invalid, rows are missing, or a joint has two rows.
+        InputError: an argument or a row is invalid, a joint has two rows, or rows, base and tool are missing.
         UnknownNameError: a mimicked joint has no row and is not in `coordinates`.
 
     Example:
@@ -418,6 +418,10 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     """Make a table from a mapping.
 
     The module's docstring shows the keys.
+
+    Raises:
+        InputError: the convention is missing, a key is unknown, or as in `table_from_rows`.
+        UnknownNameError: as in `table_from_rows`.
     """
     if "convention" not in data:
         raise InputError(

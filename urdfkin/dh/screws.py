@@ -292,6 +292,9 @@ def screws_from_rows(
         robot: The robot's name.
         base_frame: The base frame's name.
         tip_frame: The tip frame's name.
+
+    Raises:
+        InputError: a shape, a screw, M or `frame` is invalid, or the number of names is wrong.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S

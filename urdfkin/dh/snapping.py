@@ -38,7 +38,7 @@ from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, lar
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: Largest permitted tolerance, rad.
-#: Above 7.5 degrees, an angle could become either of two multiples of 15 degrees.
+#: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
@@ -61,7 +61,7 @@ def check_snap_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with snapped angles.
+    """Snap the angles of a chain.
 
     Returns:
         The chain, and a pair (k, change) for each change of a constant pose A_k.
@@ -189,7 +189,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Snap each rotation's angle."""
+    """Return the product of elementary rotations (axis, angle) with snapped angles."""
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
@@ -234,9 +234,9 @@ def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChan
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the row that contains A_k.
+    """Return the index of the row that contains A_k.
 
-    The base is row -1, and the tool is row n.
+    The base has the index -1, and the tool has the index n.
     """
     n = len(table.rows)
     if k == 0:

@@ -59,7 +59,7 @@ class AxisPair:
 
     Attributes:
         angle: Angle between the axes, at most pi/2 rad.
-        distance: Distance of the axes, m; 0 if a joint is prismatic.
+        distance: Distance between the axes, m; 0 if a joint is prismatic.
     """
 
     first: str
@@ -98,6 +98,8 @@ class Structure:
     Prismatic joints without limits are sampled within `ASSUMED_LIMIT`.
 
     Attributes:
+        joints: A letter for each joint, R or P.
+        freedoms: Rank of the Jacobian at a random configuration.
         reach: Upper bound (m) within the joint limits; infinite if a prismatic joint has no limits.
         sampled_reach: Largest sampled distance, m.
         reach_from: Point in the base frame (m), independent of q.
@@ -215,7 +217,7 @@ def _find_arm_kinds(
 
 
 def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return exact and approximate closed-form solutions."""
+    """Return the closed-form solvers for the exact and the approximate properties."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:
@@ -345,6 +347,9 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
     """Find the OPW parameters.
 
     Each entry of the tip's pose may have an error up to `tolerance` (m in the position).
+
+    Raises:
+        InputError: the arm does not have six revolute joints, or no parameters are within the tolerance.
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:

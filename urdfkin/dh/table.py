@@ -77,6 +77,10 @@ class DHRow:
         mimic: The mimic rule; None if the joint has its own coordinate.
         limit: The joint's limits; None without limits.
 
+    Raises:
+        InputError: a number is not finite, `sense` is neither 1 nor -1, or the joint is fixed, planar or
+            floating.
+
     >>> import urdfkin
     >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
     >>> row = table.rows[0]
@@ -335,7 +339,8 @@ class DHTable(Displayable):
         snap: The effect of rounded angles; None for an exact table.
 
     Raises:
-        InputError: two rows name the same joint, or base or tool is not a rigid transform.
+        InputError: the convention is unknown, two rows name the same joint, or base or tool is not a rigid
+            transform.
 
     >>> import urdfkin
     >>> print(urdfkin.load("planar_two_link").dh("tip", "base"))
@@ -530,11 +535,11 @@ class DHTable(Displayable):
         >>> bool(metres < 1e-13), bool(radians < 1e-13)
         (True, True)
         """
-        metres = self.rounding(q)
-        radians = EPS * table_roundings(len(self.rows)) + np.zeros_like(metres)
+        values, metres = self.coupling.values(q), self.rounding(q)
+        turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
+        radians = EPS * (table_roundings(len(self.rows)) + np.abs(values[..., turns]).sum(axis=-1))
         if self.snap is None:
             return metres, radians
-        values = self.coupling.values(q)
         by_name = {row.joint: values[..., i] for i, row in enumerate(self.rows)}
         return metres + self.snap.bound(by_name), radians + self.snap.radians
 

@@ -163,7 +163,12 @@ class TreeParameters:
 
 
 def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
-    """Return Khalil and Kleinfinger's parameters, exact up to rounding."""
+    """Return Khalil and Kleinfinger's parameters, exact up to rounding.
+
+    Raises:
+        InputError: the robot has a planar or floating joint.
+        RangeError: a coordinate of a joint's origin is above 1e150 m.
+    """
     check_lengths(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:

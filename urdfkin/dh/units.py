@@ -3,8 +3,8 @@ r"""Convert a table's numbers from text and to text, with fractions of pi, degre
 A table object is always in metres and radians. Other units are used only when a table is read or written.
 
 The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. A
-term of the sum is the joint's variable, a number, or a multiple of pi. A number or a multiple of pi can have
-a unit. The variable may occur once.
+term of the sum is a number, a multiple of pi, or a multiple of a joint variable. A number or a multiple of pi
+can have a unit. A cell may contain one variable, once.
 """
 
 from __future__ import annotations
@@ -43,6 +43,10 @@ class Units:
     """Format of printed numbers.
 
     In radians, exact multiples of pi/12 become fractions of pi.
+
+    Attributes:
+        digits: Significant digits.
+        columns: Order of the printed columns.
     """
 
     angles: AngleUnit = AngleUnit.RADIANS

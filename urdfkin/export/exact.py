@@ -29,7 +29,7 @@ from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.exact.numbers import (
-    DIGITS,
+    REFERENCE_DIGITS,
     NumberType,
     as_interval,
     enough_digits,
@@ -183,7 +183,7 @@ class ExactProof(Proof):
 
     @property
     def precision_text(self) -> str:
-        return f"at {DIGITS} digits"
+        return f"at {REFERENCE_DIGITS} digits"
 
     @property
     def constants_text(self) -> str:
@@ -206,7 +206,7 @@ def make_exact_functions(
     The test vectors are those of `proof`.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
-    with precision(DIGITS):
+    with precision(REFERENCE_DIGITS):
         for other in functions:
             graph = ExactGraph()
             plan = make_exact_plan(graph, verifier.text, tree, other.plan, tree.frame_link(frame))
@@ -230,7 +230,7 @@ def make_exact_functions(
 
 def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Evaluate at fifty digits, then round."""
-    with precision(DIGITS + enough_digits(len(function.plan.steps))):
+    with precision(REFERENCE_DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
             list(map(float, evaluate_intervals(function, one)))
             for one in zip(*(x.tolist() for x in inputs), strict=True)

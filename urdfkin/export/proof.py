@@ -35,7 +35,7 @@ from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
 from urdfkin.verify.call import Call, CallPart
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.numbers import (
-    DIGITS,
+    REFERENCE_DIGITS,
     as_interval,
     conversion_errors,
     enough_digits,
@@ -116,7 +116,9 @@ class Proof:
 
     @property
     def _vectors_text(self) -> str:
-        return f"; {len(self.vectors)} test vectors at {DIGITS} digits below" if self.vectors else ""
+        return (
+            f"; {len(self.vectors)} test vectors at {REFERENCE_DIGITS} digits below" if self.vectors else ""
+        )
 
     @property
     def _single_lines(self) -> list[str]:
@@ -203,7 +205,7 @@ def _make_vectors(
             single_tolerances[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0
         )
         largest_bounds[f.name] = float(relative_bounds.max(initial=0.0))
-    with precision(DIGITS + enough_digits(len(path))):
+    with precision(REFERENCE_DIGITS + enough_digits(len(path))):
         joints = read_exact_joints(verifier.text, tree, path)
         for k in range(VECTOR_COUNT):
             motion = compute_motion(tree, joints, *(x[k] for x in inputs))
@@ -243,7 +245,7 @@ def format_decimal(x: Number) -> str:
     ball = as_interval(x)
     if ball.contains(0):
         return "0.0"
-    digits, e, exponent = ball.str(DIGITS, radius=False).partition("e")
+    digits, e, exponent = ball.str(REFERENCE_DIGITS, radius=False).partition("e")
     whole, _, fraction = digits.partition(".")
     return f"{whole}.{fraction.rstrip('0') or '0'}{e}{exponent}"
 

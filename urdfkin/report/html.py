@@ -44,7 +44,7 @@ from urdfkin.report.words import (
 from urdfkin.system.lazy_import import install_command
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement, describe
-from urdfkin.verify.quantities import compared_titles, uncompared_titles
+from urdfkin.verify.quantities import format_unvalidated_titles, format_validated_titles
 from urdfkin.view.figure import has_matplotlib
 
 if TYPE_CHECKING:
@@ -149,8 +149,8 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
         summary=summary(document),
         when=format_date(document["started"]),
         pinocchio=pinocchio_version(document),
-        compared=compared_titles(),
-        not_compared=uncompared_titles(),
+        compared=format_validated_titles(),
+        not_compared=format_unvalidated_titles(),
         totals=_totals(document),
         model=_linter_verdict(document),
         verdicts=verdict_counts(document),

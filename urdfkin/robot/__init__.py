@@ -95,7 +95,8 @@ class Robot(Displayable):
     - numbers in order: `[0.5, 2.0]`
     - a mapping: `{"elbow": 0.5, "wrist": "30deg"}`; its values may be batches
     - a text with names: `"elbow=0.5, wrist=2"`
-    - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
+    - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`. For `v`
+      and `a`, the only pose is `"neutral"`: all zeros.
 
     A text that begins with the name of a pose needs only the values that differ from the pose. Every other
     text, and every mapping, must contain a value for every coordinate.
@@ -207,7 +208,8 @@ class Robot(Displayable):
             height: Height of the cell, pixels.
 
         Raises:
-            InputError: a wrong length, a number that is not finite, or a batch.
+            InputError: a wrong length, a number that is not finite, a batch, or a height that is not a whole
+                number from 1 to 10,000.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -661,13 +663,14 @@ class Robot(Displayable):
         The conversion applies to q, v, a, Jacobians and six-vectors, in both directions.
 
         Args:
-            name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
-                path of a TOML file.
+            name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), the
+                path of a TOML file, or a `Convention`.
             joints: Names of the joints in the order of your program or policy; None: the order of the
                 convention.
 
         Raises:
-            UnknownNameError: there is no such convention, file or joint.
+            UnknownNameError: there is no such convention or joint.
+            SourceError: the file cannot be read.
             InputError: an invalid file, a joint without a column, or two columns with the same name.
 
         >>> import urdfkin
@@ -1193,8 +1196,9 @@ class Robot(Displayable):
     ) -> AccelerationBreakdown:
         """Return the contributions of each joint to a frame's classical acceleration (eq. 7.125, 7.130).
 
-        A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. The sum of all
-        contributions is the result of `acceleration`, and is compared with Pinocchio's acceleration.
+        A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. A moving `base`
+        has one contribution. The sum of all contributions is the result of `acceleration`. The check compares
+        this sum with Pinocchio's acceleration.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1363,7 +1367,8 @@ class Robot(Displayable):
         Args:
             to: Language, one of `urdfkin.export.LANGUAGES`, such as "c" or "numpy".
             frame: Name of a link or joint; None: `tip_frame`.
-            quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
+            quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "hessian",
+                "acceleration".
             reference: Reference frame of velocities, accelerations and Jacobians.
             form: Source of the pose: "tree": the joints of the URDF. "dh": the Denavit-Hartenberg table from
                 `base_frame` to the frame. "screws": the product of exponentials from `base_frame` to the
@@ -1509,7 +1514,8 @@ class Robot(Displayable):
                 axis. "joint": d_1 and theta_1 are 0, and the table's base transform contains the offset and
                 the rotation (Craig's choice).
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
-                length a is not negative. "alpha": the angle alpha is not negative.
+                length a is not negative. "alpha": the angle alpha is not negative. The tip determines the x
+                axis of the last row.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
                 joint's origin in the URDF. `make_dh_table` lists exceptions, such as the first joint.
                 "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint, so
@@ -1524,9 +1530,9 @@ class Robot(Displayable):
 
         Raises:
             UnknownNameError: a frame or a joint does not exist.
-            InputError: an option has an invalid value, or the path contains a planar or floating joint. The
-                combination of `like` with another value than the default of `flip`, `first`, `last`, `sign`
-                or `parallel_offset` also raises InputError.
+            InputError: an option has an invalid value, `like` excludes an option or describes a different
+                robot, or the path contains a planar or floating joint.
+            RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
             TableError: Pinocchio's placements differ by more than the bound.
 
         Example:

@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 
 class ConventionRobot:
-    """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
+    """A robot in the convention of a target program, from `robot.with_convention("mujoco")`.
 
     Each method has the name and the arguments of a method of `Robot`. The target program's order applies
     to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's units
-    apply to q, v and a. Pinocchio checks each result before the conversion.
+    apply to q, v and a, and to the columns of Jacobians: J v is in m/s and rad/s. Pinocchio checks each
+    result before the conversion. An array `out` receives the result before the conversion.
 
     Attributes:
         robot: The robot.
@@ -113,13 +114,15 @@ class ConventionRobot:
     ) -> FloatArray:
         """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
         ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *arguments, **options)
-        J = self.robot.jacobian(ours[0], frame, *arguments, **options)
+        # A second result in `out` would replace the first.
+        J = self.robot.jacobian(ours[0], frame, *arguments, **{**options, "out": None})
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 
     def hessian(self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any) -> FloatArray:
         """Return the derivatives (..., 6, nv, nv) of the target program's Jacobian; see `Robot.hessian`."""
         ours, H = self._call(self.robot.hessian, (q,), frame, *arguments, **options)
-        return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *arguments, **options), H)
+        J = self.robot.jacobian(ours[0], frame, *arguments, **{**options, "out": None})
+        return self.conversion.hessian(ours[0], J, H)
 
     def analytical_jacobian(
         self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
@@ -135,10 +138,7 @@ class ConventionRobot:
     def _call(
         self, method: Callable[..., FloatArray], inputs: tuple[Any, ...], *arguments: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Convert the inputs to urdfkin's convention, and call a method of `Robot` with the converted inputs.
-
-        Return the converted inputs and the method's result.
-        """
+        """Return the inputs in urdfkin's convention, and the method's result for these inputs."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", inputs, strict=False)

@@ -166,7 +166,7 @@ def frame_motion(
         reference: Reference frame of velocity, acceleration and Jacobian.
 
     Raises:
-        InputError: an array has a wrong length, or contains a number that is not finite.
+        InputError: an array is missing, has a wrong length, or contains a number that is not finite.
         UnknownNameError: the frame or reference does not exist.
 
     >>> import urdfkin

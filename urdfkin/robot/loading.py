@@ -78,8 +78,8 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
     - a path: .urdf, .xacro, .xml for MJCF (`docs/mjcf.md`), .usd, .usda, .usdc or .usdz (`docs/usd.md`)
     - a name of the catalogue; `urdfkin robots` lists them
     - URDF or MJCF as text, bytes or an open file; `-` is standard input
-    - a `DHTable`, or a file with one (.toml, .json, .csv, .tsv, .md, .tex, .txt); the table's base frame
-      becomes the root link, and its tip becomes the leaf link
+    - a `DHTable`, or a file with one (.toml, .json, .csv, .tsv, .md, .tex, .txt). The table's base frame
+      becomes the root link, and the table's tip becomes the leaf link.
     - a product of exponentials (`urdfkin.dh.screws`), or a file with M and screws
     - a `pinocchio.Model` or RobotWrapper, a `yourdfpy.URDF`, an ElementTree of Python or lxml
     - a module of the package robot_descriptions, or the name of such a module, such as "panda_description"
@@ -109,6 +109,7 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         SourceError: the source cannot be read.
         UnknownNameError: no file and no robot has the name `source`; the message lists similar names.
         TableError: the robot made from a table does not reproduce the tip placements of the table.
+        OracleError: the robot made from an MJCF or USD file or a `pinocchio.Model` differs from its source.
         InputError: an argument has an invalid value.
 
     >>> arm = load("planar_two_link")
@@ -233,7 +234,7 @@ def _load_mjcf(
     checks = bool(as_verify(options["verify"]))
     data = _read_mjcf_bytes(source)
     digest = hashlib.sha256(data).hexdigest()
-    read = read_mjcf(source, check=checks)
+    read = read_mjcf(source, with_check_data=checks)
     name = (
         unambiguous_path(Path(read.path))
         if read.path
@@ -390,7 +391,9 @@ def make_robot(
         verify=verify,
         mimic=mimic,
         findings=findings,
-        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced_findings))),
+        unverifiable=_find_unverified_reason(
+            (*findings, *(finding for finding, _ in report.silenced_findings))
+        ),
         oracle=oracle,
         base_frame=text.entry.base_frame if text.entry else None,
         tip_frame=text.entry.tip_frame if text.entry else None,
@@ -399,7 +402,7 @@ def make_robot(
     return robot if is_plain else robot.with_locked_joints(lock, joints)
 
 
-def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
+def _find_unverified_reason(findings: tuple[Finding, ...]) -> str | None:
     """Return why Pinocchio cannot check the robot, or None."""
     problems = {
         PinocchioReading.REFUSES: "Pinocchio refuses the file",

@@ -204,6 +204,10 @@ def make_line_trajectory(
     A planar or floating joint makes a screw motion about a fixed axis. The rotation of this screw motion is
     at most half a turn. A continuous joint moves by `end - start`, even by more than one turn. `duration` is
     in seconds. `samples` is the number of samples, including the first and the last sample.
+
+    Raises:
+        InputError: the duration is not above 0 s, `samples` is below 3, or a configuration has a wrong length
+            or a number that is not finite.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)

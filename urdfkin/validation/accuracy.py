@@ -39,11 +39,17 @@ from urdfkin.verify.bounds import (
     singularity_margin,
 )
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.numbers import DIGITS, as_interval, enough_digits, precision, read_exact_joints
+from urdfkin.verify.exact.numbers import (
+    REFERENCE_DIGITS,
+    as_interval,
+    enough_digits,
+    precision,
+    read_exact_joints,
+)
 from urdfkin.verify.exact.recursion import compute_motion, make_base_state
 from urdfkin.verify.oracle import BaseRows, davenport_matrix
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated_quantities
-from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_results
+from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compute_own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
@@ -107,7 +113,7 @@ def accuracy_study(
     """
     x = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
     longest_path = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
-    with precision(max(DIGITS, enough_digits(longest_path))):
+    with precision(max(REFERENCE_DIGITS, enough_digits(longest_path))):
         lines = tuple(_AccuracyBatch(robot, x, base).lines())
         return AccuracyStudy(robot.name, samples, seed, lines, base is not None)
 
@@ -162,7 +168,7 @@ class _AccuracyBatch:
         part = self.part._replace(reference=reference, query=query)
         urdfkin_results, pinocchio_results = (
             compute_own_results(row, part),
-            oracle_results(row, self.oracle, query),
+            compute_oracle_results(row, self.oracle, query),
         )
         scale = np.broadcast_to(compute_bound(row, part).scale, urdfkin_results.shape)
         return _AccuracySamples(

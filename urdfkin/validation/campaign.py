@@ -69,8 +69,8 @@ def validate(
 ) -> ValidationReport:
     """Compare every frame and joint with Pinocchio in all three reference frames.
 
-    `urdfkin.verify.quantities.compared_titles()` lists the quantities that are compared, and
-    `uncompared_titles()` lists all other quantities.
+    `urdfkin.verify.quantities.format_validated_titles()` lists the quantities that are compared, and
+    `format_unvalidated_titles()` lists all other quantities.
 
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.

@@ -365,8 +365,9 @@ class _FunctionResults:
     oracle_results: FloatArray | None
 
     def bound_ratios(self, other: FloatArray) -> FloatArray:
+        # k is NaN if the bound is invalid: no result is within such a bound.
         k = self.k.reshape(-1, *[1] * (self.actual.ndim - 1))
-        return self.units(other) / k
+        return np.where(np.isnan(k), np.inf, self.units(other) / k)
 
     def units(self, other: FloatArray) -> FloatArray:
         return disagreement(self.actual, other, self.scale)

@@ -25,7 +25,7 @@ from urdfkin.validation.document import VALIDATION, Document, RunOutcome, Valida
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, ErrorStats, Key
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
 from urdfkin.verify.oracles import ORACLES, package_version, package_versions
-from urdfkin.verify.quantities import QUANTITIES, replay_line
+from urdfkin.verify.quantities import QUANTITIES, format_replay_command
 
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import AccuracyStudy
@@ -111,7 +111,9 @@ class RobotReport:
         # Therefore, a joint needs the prefix "joint:".
         frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
-        return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
+        return format_replay_command(
+            origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs}
+        )
 
     def as_dict(self, study: AccuracyStudy | None = None) -> dict[str, Any]:
         names = (

@@ -39,7 +39,7 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.verify.bounds import true_value_magnitudes
 from urdfkin.verify.exact.numbers import (
-    DIGITS,
+    REFERENCE_DIGITS,
     conversion_errors,
     enough_digits,
     format_decimal,
@@ -417,7 +417,7 @@ def _compute_sample(
 ) -> tuple[dict[str, list[str]], list[dict[str, Any]]]:
     q, v, a = make_configuration(robot.tree, name, sample)
     inputs = {name: [repr(float(x)) for x in array] for name, array in zip("qva", (q, v, a), strict=True)}
-    digits = max(DIGITS, enough_digits(len(robot.tree.joints)))
+    digits = max(REFERENCE_DIGITS, enough_digits(len(robot.tree.joints)))
     while True:
         results = list(_compute_results(robot, frames, (q, v, a), digits))
         if all(None not in one["value"] for one in results):

@@ -57,9 +57,11 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
+        answer: Last answer of the process that contains a robot.
         shapes_refusal: None if the robot comes from the complete file. Otherwise, the robot comes from
-            the file without shapes and inertias. With check=True, the text says why reading the
-            complete file failed.
+            the file without shapes and inertias, and the text says why. The text has no meaning if
+            `read_mjcf` was called without `with_check_data`.
+        pinocchio: Placements of the bodies by Pinocchio's MJCF reader, or an error. None without an answer.
     """
 
     urdf: str
@@ -71,12 +73,15 @@ class MjcfReading:
 
 
 def read_mjcf(
-    source: str | bytes | os.PathLike[str], *, check: bool = True, timeout: float = TIMEOUT
+    source: str | bytes | os.PathLike[str], *, with_check_data: bool = True, timeout: float = TIMEOUT
 ) -> MjcfReading:
-    """Read an MJCF robot in a separate process.
+    """Read an MJCF file or text in a separate process.
 
-    If `check` is True, the process computes data for `check_mjcf_source`.
+    If `with_check_data` is True, the process computes data for `check_mjcf_source`.
     `timeout` is in seconds.
+
+    Raises:
+        InputError: MuJoCo or urdfkin does not accept the file, or the process ends without a robot.
     """
     version()
     name = source_name(source)
@@ -86,25 +91,27 @@ def read_mjcf(
         "path": path,
         "text": _decode_text(source, name) if text else None,
         "name": name,
-        "samples": _SAMPLE_COUNT if check else 0,
+        "samples": _SAMPLE_COUNT if with_check_data else 0,
         "seconds": ceil(timeout) + 1,
     }
-    answers, ending = _ask_process(request, timeout)
-    reading = [answer for answer in answers if "urdf" in answer]
-    if not reading:
+    answers, ending = _request_answers(request, timeout)
+    robot_answers = [answer for answer in answers if "urdf" in answer]
+    if not robot_answers:
         raise InputError(
             "MuJoCo cannot compile this MJCF",
             where=name,
             found=ending,
             remedy="check the file for very large numbers, for example in <replicate>",
         )
-    reasons = [answer["shapes_refusal"] for answer in answers if "shapes_refusal" in answer]
+    refusals = [answer["shapes_refusal"] for answer in answers if "shapes_refusal" in answer]
     return MjcfReading(
-        reading[-1]["urdf"],
-        tuple(MjcfRemark(*one) for one in reading[-1]["listed"]),
+        robot_answers[-1]["urdf"],
+        tuple(MjcfRemark(*one) for one in robot_answers[-1]["listed"]),
         path,
-        reading[-1],
-        None if reading[-1]["whole"] else escape_unprintable((reasons or [ending])[0])[:_MAX_QUOTE_LENGTH],
+        robot_answers[-1],
+        None
+        if robot_answers[-1]["whole"]
+        else escape_unprintable((refusals or [ending])[0])[:_MAX_QUOTE_LENGTH],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
@@ -116,7 +123,7 @@ def _decode_text(source: str | bytes | os.PathLike[str], name: str) -> str:
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=str(error)) from None
 
 
-def _ask_process(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[str, Any]], str]:
+def _request_answers(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[str, Any]], str]:
     command = python_command(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
@@ -125,7 +132,11 @@ def _ask_process(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[
 
 
 def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
-    """Compare a robot with MuJoCo's model."""
+    """Compare a robot with MuJoCo's model, and return a sentence about the result.
+
+    Raises:
+        OracleError: A body, a site or a mimic rule differs from MuJoCo's by more than rounding errors.
+    """
     tree, answer = verifier.tree, reading.answer
     q = unpack_array(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
@@ -136,55 +147,53 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpack_array(answer["lengths"]), unpack_array(answer["angles"]))
-    share = _compute_bound_shares(ours, _unpack_placements(answer["placements"]), bound)
-    if not (share <= 1.0).all():
-        k, f = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
-        raise _error(
-            f"{tree.name}, {frames[f]}", f"{share[k, f]:.3g} times the bound of rounding, MuJoCo {version()}"
+    ratio = _compute_bound_ratios(ours, _unpack_placements(answer["placements"]), bound)
+    if not (ratio <= 1.0).all():
+        k, f = np.unravel_index(int(np.nan_to_num(ratio, nan=np.inf).argmax()), ratio.shape)
+        raise _make_error(
+            f"{tree.name}, {frames[f]}", f"{ratio[k, f]:.3g} times the bound of rounding, MuJoCo {version()}"
         )
-    rules_share = _check_rules(tree.name, answer)
+    rule_ratio = _check_rules(tree.name, answer)
     line = (
         f"compared with MuJoCo {version()}: {len(frames)} bodies and sites of the MJCF agree in {len(q)}"
-        f" configurations ({share.max(initial=0.0):.1%} of the bound)"
+        f" configurations ({ratio.max(initial=0.0):.1%} of the bound)"
     )
-    if rules_share is not None:
-        line += f", and {len(answer['rules'])} mimic rules agree ({rules_share:.1%})"
+    if rule_ratio is not None:
+        line += f", and {len(answer['rules'])} mimic rules agree ({rule_ratio:.1%})"
     if reading.shapes_refusal is not None:
         line += f"; MuJoCo compiles the file only without shapes and inertias: {reading.shapes_refusal}"
     return f"{line}; {_compare_with_pinocchio(reading, ours, bound)}"
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Compare mimic rules with MuJoCo's joint equalities.
-
-    Returns:
-        Largest ratio of error to bound, or None if there are no rules.
-    """
+    """Return the largest ratio of error to bound, or None if there are no rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
     if different := active.symmetric_difference(rules.keys() | set(answer["apart"])):
         first = min(different)
         what = f"mimic joint {rules[first]}" if first in rules else f"equality {first}"
-        raise _error(
+        raise _make_error(
             f"{name}, {what}",
             f"MuJoCo {version()} {'has' if first in active else 'does not have'} this constraint",
         )
     if not rules:
         return None
-    columns = sorted(rules)
-    residuals, sizes = residuals[:, columns], sizes[:, columns]
+    equalities = sorted(rules)
+    residuals, sizes = residuals[:, equalities], sizes[:, equalities]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.abs(residuals) / (MJCF_MIMIC_ROUNDINGS * EPS * sizes)
-    share = np.where(residuals == 0.0, 0.0, share)
-    if not (share <= 1.0).all():
-        k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
+        ratio = np.abs(residuals) / (MJCF_MIMIC_ROUNDINGS * EPS * sizes)
+    ratio = np.where(residuals == 0.0, 0.0, ratio)
+    if not (ratio <= 1.0).all():
+        k, i = np.unravel_index(int(np.nan_to_num(ratio, nan=np.inf).argmax()), ratio.shape)
         off = abs(residuals[k, i])
-        raise _error(f"{name}, mimic joint {rules[columns[i]]}", f"MuJoCo {version()} differs by {off:.3g}")
-    return float(share.max())
+        raise _make_error(
+            f"{name}, mimic joint {rules[equalities[i]]}", f"MuJoCo {version()} differs by {off:.3g}"
+        )
+    return float(ratio.max())
 
 
-def _error(where: str, found: str) -> OracleError:
+def _make_error(where: str, found: str) -> OracleError:
     return OracleError(
         "the robot made from an MJCF file differs from the file",
         where=where,
@@ -200,10 +209,10 @@ def _unpack_placements(found: Mapping[str, Any]) -> FloatArray:
     return T
 
 
-def _compute_bound_shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
+def _compute_bound_ratios(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
     units = worst_disagreements(ours, theirs, bound.scale, 2)
-    share: FloatArray = units / broadcast_k(bound, units.shape)
-    return share
+    ratio: FloatArray = units / broadcast_k(bound, units.shape)
+    return ratio
 
 
 def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound) -> str:
@@ -215,12 +224,12 @@ def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound
     names = list(found["bodies"])
     if not names:
         return "not compared with Pinocchio's MJCF reader, because the file has no bodies"
-    places = [name for name, _ in reading.answer["frames"]]
-    bodies, theirs = [places.index(name) for name in names], _unpack_placements(found["placements"])
-    share = _compute_bound_shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
-    if (share <= 1.0).all():
+    frame_names = [name for name, _ in reading.answer["frames"]]
+    bodies, theirs = [frame_names.index(name) for name in names], _unpack_placements(found["placements"])
+    ratio = _compute_bound_ratios(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
+    if (ratio <= 1.0).all():
         return "Pinocchio's MJCF reader agrees on the poses of the bodies"
-    f = int(share.max(axis=0).argmax())
+    f = int(ratio.max(axis=0).argmax())
     off = np.abs(ours[:, bodies[f]] - theirs[:, f])[:, :3]
     return (
         f"Pinocchio's MJCF reader disagrees: its {names[f]} differs by up to {off[..., 3].max():.3g} m,"

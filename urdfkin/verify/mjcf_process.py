@@ -4,9 +4,12 @@ A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require a
 or crash a parser. The process reads a request from standard input, and writes each answer as a line of JSON
 to standard output:
 
-1. the robot, compiled without its shapes
-2. the robot, compiled from the complete file
+1. the robot, compiled without shapes and inertias
+2. the robot, compiled from the complete file, or the reason why MuJoCo does not compile this file
 3. the placements of the bodies by Pinocchio's reader
+
+A request without samples has no third answer. Such a request has the second answer only if MuJoCo aligns a
+free body with its inertial frame.
 
 If the process ends early, the answers that it has already written remain valid.
 """
@@ -89,6 +92,9 @@ def parse_answers(
 
     Returns:
         All answers, and a text on the process's end. The text explains a missing answer.
+
+    Raises:
+        InputError: An answer is an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -106,48 +112,48 @@ def parse_answers(
 def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
-    read = read_mjcf(source, request["name"])
-    q = _make_configurations(read, samples)
-    yield _make_answer(read, q)
-    if samples or read.aligns_free_bodies:
+    mjcf = read_mjcf(source, request["name"])
+    q = _make_configurations(mjcf, samples)
+    yield _make_robot_answer(mjcf, q)
+    if samples or mjcf.aligns_free_bodies:
         try:
-            whole = read_mjcf(source, request["name"], with_shapes=True)
-            q = _make_configurations(whole, samples)
-            yield _make_answer(whole, q)
-            read = whole
+            complete = read_mjcf(source, request["name"], with_shapes=True)
+            q = _make_configurations(complete, samples)
+            yield _make_robot_answer(complete, q)
+            mjcf = complete
         except (MemoryError, InputError, import_mujoco().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
                 raise  # MuJoCo compiles the file, but urdfkin does not support the model.
             found = error.found if isinstance(error, InputError) else str(error)
             yield {"shapes_refusal": _add_memory_hint(found) or _MEMORY_HINT}
     if samples and path is not None:
-        yield {"pinocchio": _compute_with_pinocchio(path, read, q)}
+        yield {"pinocchio": _compute_with_pinocchio(path, mjcf, q)}
 
 
-def _make_configurations(read: Mjcf, samples: int) -> FloatArray:
+def _make_configurations(mjcf: Mjcf, samples: int) -> FloatArray:
     if not samples:
-        return np.empty((0, read.tree.nq))
-    drawn = sample(read.tree, samples, np.random.default_rng(0))
-    return np.vstack((neutral(read.tree), drawn))
+        return np.empty((0, mjcf.tree.nq))
+    drawn = sample(mjcf.tree, samples, np.random.default_rng(0))
+    return np.vstack((neutral(mjcf.tree), drawn))
 
 
-def _make_answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
+def _make_robot_answer(mjcf: Mjcf, q: FloatArray) -> dict[str, Any]:
     answer: dict[str, Any] = {
-        "urdf": to_urdf(read.tree),
-        "listed": [astuple(one) for one in read.remarks],
-        "whole": read.with_shapes,
-        "frames": [(name, kind) for name, (kind, _) in read.frames.items()],
-        "rules": [(i, name) for i, name in read.mimic_equalities.items()],
-        "apart": sorted(read.other_equalities),
+        "urdf": to_urdf(mjcf.tree),
+        "listed": [astuple(one) for one in mjcf.remarks],
+        "whole": mjcf.with_shapes,
+        "frames": [(name, kind) for name, (kind, _) in mjcf.frames.items()],
+        "rules": [(i, name) for i, name in mjcf.mimic_equalities.items()],
+        "apart": sorted(mjcf.other_equalities),
     }
     if len(q):
         answer |= {
             "q": pack_array(q),
-            "placements": pack_array(read.placements(q)[..., :3, :]),
-            "lengths": pack_array(read.origin_distance_bounds(q)),
-            "angles": pack_array(read.hinge_angle_sums(q)),
-            "residuals": pack_array(read.residuals(q)),
-            "rule_sizes": pack_array(read.rule_scales(q)),
+            "placements": pack_array(mjcf.placements(q)[..., :3, :]),
+            "lengths": pack_array(mjcf.origin_distance_bounds(q)),
+            "angles": pack_array(mjcf.hinge_angle_sums(q)),
+            "residuals": pack_array(mjcf.residuals(q)),
+            "rule_sizes": pack_array(mjcf.rule_scales(q)),
         }
     return answer
 
@@ -162,41 +168,38 @@ def unpack_array(found: Mapping[str, Any]) -> FloatArray:
     return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
 
 
-def _compute_with_pinocchio(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
-    bodies = [name for name, (kind, i) in read.frames.items() if kind == "body" and i]
+def _compute_with_pinocchio(path: str, mjcf: Mjcf, q: FloatArray) -> dict[str, Any]:
+    bodies = [name for name, (kind, i) in mjcf.frames.items() if kind == "body" and i]
     try:
-        placed = _pinocchio_placements(path, read.qpos(q), read.qpos_index, bodies)
+        placements = _compute_pinocchio_placements(path, mjcf.qpos(q), mjcf.qpos_index, bodies)
     except (OracleError, InstallationError) as error:
         return {"error": str(error)}
-    return {"bodies": bodies, "placements": pack_array(placed[..., :3, :])}
+    return {"bodies": bodies, "placements": pack_array(placements[..., :3, :])}
 
 
-def _pinocchio_placements(
-    path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
+def _compute_pinocchio_placements(
+    path: str, qpos: FloatArray, qpos_index: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return Pinocchio's placements of the bodies.
-
-    `coordinates` contains each joint's first index in `qpos`.
-    """
+    # `qpos_index` contains each joint's first index in a row of `qpos`.
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
     except Exception as error:  # Pinocchio's parsers raise many types of exceptions.
         raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
-    joints = dict(_list_coordinates(model, list(coordinates)))
-    if joints.keys() != coordinates.keys():
-        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_MAX_NAMES])
+    q_ranges = dict(_list_coordinates(model, list(qpos_index)))
+    if q_ranges.keys() != qpos_index.keys():
+        found = ", ".join(sorted(q_ranges.keys() ^ qpos_index.keys())[:_MAX_NAMES])
         raise OracleError("the reader finds different joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
         raise OracleError("the reader does not find one of the bodies in the file", found=missing[0])
     data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
     ids = [int(model.getFrameId(name, pin.FrameType.BODY)) for name in bodies]
-    for k, numbers in enumerate(qpos):
+    for k, qpos_row in enumerate(qpos):
         q = pin.neutral(model)
-        for name, at in coordinates.items():
-            (first, count), x = joints[name], numbers[at]
+        for name, at in qpos_index.items():
+            (first, count), x = q_ranges[name], qpos_row[at]
             if count == _FREE_JOINT_SIZE:
-                q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
+                q[first : first + 7] = [*qpos_row[at : at + 3], *np.roll(qpos_row[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
             else:  # In Pinocchio, a revolute joint without limits has two coordinates: cosine and sine.
@@ -215,8 +218,8 @@ def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, t
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")
         if first != name and first in names:
-            at = names.index(first)
-            for i, part in enumerate(names[at : at + joint.nq]):
+            k = names.index(first)
+            for i, part in enumerate(names[k : k + joint.nq]):
                 yield part, (joint.idx_q + i, 1)
         else:
             yield name, (joint.idx_q, joint.nq)

@@ -4,7 +4,7 @@ MuJoCo reads the origins and axes of joints from the URDF text with its own pars
 Pinocchio, MuJoCo computes with unit quaternions, and MuJoCo's six-vectors refer to a centre of mass. This
 module changes the text before MuJoCo reads it:
 
-- Each link becomes a body. Meshes and inertials are removed. In the compiled model, only the root has a mass.
+- Each link becomes a body without meshes. In the compiled model, only the root has a mass.
   The centre of mass, to which MuJoCo's results refer, is therefore the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
@@ -14,8 +14,9 @@ module changes the text before MuJoCo reads it:
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
-floating or planar joint, urdfkin's v is in the axes of the child link, but MuJoCo's qvel is in the axes of
-the parent link. S therefore also contains the rotation from the child's axes to the parent's axes.
+floating or planar joint, urdfkin's linear velocity is in the axes of the child link. The velocities of
+MuJoCo's slide joints are in the axes of the joint frame. S therefore also contains the rotation from the
+child's axes to the joint frame's axes. The angular velocities are equal.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from urdfkin.verify.pinocchio import tree_depth
 
 #: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
-#: Maximum number of links in a chain.
+#: Maximum number of joints on a path.
 #: MuJoCo's loading time grows with the square of the number of links.
 #: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
 _MAX_DEPTH = 1_000
@@ -77,10 +78,10 @@ class _MujocoIndices:
     Attributes:
         qpos: Index in MuJoCo's vector.
         qvel: Index in MuJoCo's vector.
-        q: Index in urdfkin's q; -1 for a moving base.
+        q: Index in urdfkin's q; -1 for a moving base. A mimic joint has the mimicked joint's index.
         v: Index in urdfkin's v; -1 for a moving base or locked joint.
-        multiplier: 0 for a locked joint.
-        offset: Value of a locked joint.
+        multiplier: From the mimic rule; 0 for a locked joint.
+        offset: From the mimic rule, or the value of a locked joint.
     """
 
     kind: str
@@ -141,15 +142,15 @@ class MujocoOracle(Oracle):
             spec.option.gravity = (0.0, 0.0, 0.0)
             for i, joint in enumerate(joints):
                 for part in _REPLACEMENT_JOINTS.get(joint.kind, ()):
-                    what, _, axis = part.partition(" ")
-                    kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
+                    joint_type, _, axis = part.partition(" ")
+                    kind = getattr(mujoco.mjtJoint, f"mjJNT_{joint_type.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
             return _move_mass_to_root(compile_spec(spec), self._bodies[root])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
-            first = str(error).strip().replace("\n", "; ")
+            message = str(error).strip().replace("\n", "; ")
             raise OracleError(
-                "MuJoCo does not accept this robot", where=self.tree.name, found=first
+                "MuJoCo does not accept this robot", where=self.tree.name, found=message
             ) from error
 
     def _make_joint_element(self, i: int, joint: _Joint) -> Element:
@@ -158,11 +159,11 @@ class MujocoOracle(Oracle):
         SubElement(element, "parent", link=self._bodies[joint.parent])
         SubElement(element, "child", link=self._bodies[joint.child])
         for tag, names in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
-            found = None if joint.element is None else joint.element.find(tag)
-            if found is not None and found.get("quat_xyzw") is not None:
+            source = None if joint.element is None else joint.element.find(tag)
+            if source is not None and source.get("quat_xyzw") is not None:
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
-            if found is not None and (tag == "origin" or kind != "fixed"):
-                SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
+            if source is not None and (tag == "origin" or kind != "fixed"):
+                SubElement(element, tag, {name: x for name in names if (x := source.get(name)) is not None})
         # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
@@ -221,73 +222,75 @@ class MujocoOracle(Oracle):
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         J = np.empty((len(x.q), len(x.frames), 6, self.nv))
-        S_of_sample = self._velocity_matrix(x.q)
+        S_all = self._compute_velocity_matrix(x.q)
 
-        def read(body: int, at: tuple[int, int]) -> None:
-            J[at] = self._read_jacobian(self._mujoco.mj_jac, body) @ S_of_sample[at[0] % len(S_of_sample)]
+        def store(body: int, index: tuple[int, int]) -> None:
+            J[index] = self._read_jacobian(self._mujoco.mj_jac, body) @ S_all[index[0] % len(S_all)]
 
-        poses = self._compute_poses(x, 1, read)
+        poses = self._compute_poses(x, 1, store)
         return _change_reference(x.reference, poses, J, columns=True)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         J, rate = np.empty((2, len(x.q), len(x.frames), 6, self.nv))
         velocity = np.empty((len(x.q), len(x.frames), 6))
-        S_of_sample, spread_rate = self._velocity_matrix(x.q), self._velocity_matrix_rate(x.q, x.v)
+        S_all = self._compute_velocity_matrix(x.q)
+        S_rate_all = self._compute_velocity_matrix_rate(x.q, x.v)
 
-        def read(body: int, at: tuple[int, int]) -> None:
-            S, S_rate = S_of_sample[at[0] % len(S_of_sample)], spread_rate[at[0] % len(spread_rate)]
+        def store(body: int, index: tuple[int, int]) -> None:
+            k = index[0]
+            S, S_rate = S_all[k % len(S_all)], S_rate_all[k % len(S_rate_all)]
             J_full = self._read_jacobian(self._mujoco.mj_jac, body)
-            J[at] = J_full @ S
-            rate[at] = self._read_jacobian(self._mujoco.mj_jacDot, body) @ S + J_full @ S_rate
-            velocity[at] = self._read_six_vector(self._mujoco.mj_objectVelocity, body)
+            J[index] = J_full @ S
+            rate[index] = self._read_jacobian(self._mujoco.mj_jacDot, body) @ S + J_full @ S_rate
+            velocity[index] = self._read_six_vector(self._mujoco.mj_objectVelocity, body)
 
-        poses = self._compute_poses(x, 2, read)
+        poses = self._compute_poses(x, 2, store)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
-        which = Reference.of(x.reference)
-        if which.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
+        reference = Reference.of(x.reference)
+        if reference.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
-        out = _change_reference(which, poses, rate, columns=True)
-        if which.at_world:  # The derivative of p x J_angular contains vel x J_angular.
+        out = _change_reference(reference, poses, rate, columns=True)
+        if reference.at_world:  # The derivative of p x J_angular contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
-    def _compute_motion(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _compute_motion(self, x: QueryBatch, input_count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         velocity, acceleration = np.empty((2, len(x.q), len(x.frames), 6))
 
-        def read(body: int, at: tuple[int, int]) -> None:
-            velocity[at] = self._read_six_vector(self._mujoco.mj_objectVelocity, body)
-            if count == len("qva"):
-                acceleration[at] = self._read_six_vector(self._mujoco.mj_objectAcceleration, body)
+        def store(body: int, index: tuple[int, int]) -> None:
+            velocity[index] = self._read_six_vector(self._mujoco.mj_objectVelocity, body)
+            if input_count == len("qva"):
+                acceleration[index] = self._read_six_vector(self._mujoco.mj_objectAcceleration, body)
 
-        return self._compute_poses(x, count, read), velocity, acceleration
+        return self._compute_poses(x, input_count, store), velocity, acceleration
 
     def _compute_poses(
-        self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]
+        self, x: QueryBatch, input_count: int, store: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
         """Return the placements of all frames.
 
-        MuJoCo receives q (count = 1), q and v (2), or q, v and a (3).
-        For each sample k and frame f, this method calls `read(body, (k, f))`.
+        MuJoCo receives q (input_count = 1), q and v (2), or q, v and a (3).
+        For each sample k and frame f, this method calls `store(body, (k, f))`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]
         out = np.zeros((len(x.q), len(bodies), 4, 4))
         out[..., 3, 3] = 1.0
-        qpos, rates, second = self._convert_inputs(x, count)
+        qpos, qvel, qacc = self._convert_inputs(x, input_count)
         for k in range(len(x.q)):
             data.qpos[:] = qpos[k]
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
-            if rates is not None:
-                data.qvel[:] = rates[k]
+            if qvel is not None:
+                data.qvel[:] = qvel[k]
                 mujoco.mj_comVel(model, data)
-            if second is not None:
-                data.qacc[:] = second[k]
+            if qacc is not None:
+                data.qacc[:] = qacc[k]
                 mujoco.mj_rnePostConstraint(model, data)
             for f, body in enumerate(bodies):
                 out[k, f, :3, :3], out[k, f, :3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
-                read(body, (k, f))
+                store(body, (k, f))
         return out
 
     def _read_jacobian(self, function: Callable[..., None], body: int) -> FloatArray:
@@ -298,7 +301,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _read_six_vector(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Read a velocity or acceleration [linear; angular] in world axes."""
+        """Read a velocity or classical acceleration [linear; angular] in world axes."""
         six = np.empty(6)
         # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
@@ -307,7 +310,7 @@ class MujocoOracle(Oracle):
     # -- layout --------------------------------------------------------------------------------------
 
     def _convert_inputs(
-        self, x: QueryBatch, count: int
+        self, x: QueryBatch, input_count: int
     ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
@@ -316,36 +319,36 @@ class MujocoOracle(Oracle):
             if joint.q < 0:
                 T = np.eye(4) if base is None else np.asarray(base.placement)
                 qpos[:, at : at + 3] = T[..., :3, 3]
-                qpos[:, at + 3 : at + 7] = _scalar_first(nearest_quaternion(T[..., :3, :3]))
+                qpos[:, at + 3 : at + 7] = _move_scalar_first(nearest_quaternion(T[..., :3, :3]))
             elif joint.kind == "floating":
                 qpos[:, at : at + 3] = coordinates[:, :3]
-                qpos[:, at + 3 : at + 7] = _unit_quaternion(coordinates)
+                qpos[:, at + 3 : at + 7] = _normalise_quaternion(coordinates)
             elif joint.kind == "planar":
                 qpos[:, at : at + 3] = coordinates[:, :3]
             elif joint.v < 0:
                 qpos[:, at] = joint.offset
             else:
                 qpos[:, at] = joint.multiplier * coordinates[:, 0] + joint.offset
-        if count == 1:
+        if input_count == 1:
             return qpos, None, None
-        S, v = self._velocity_matrix(q), x.v
-        rates = (S @ v[..., None])[..., 0]
-        second = None
-        if count == len("qva"):
-            second = (S @ x.a[..., None] + self._velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
-        rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
+        S, v = self._compute_velocity_matrix(q), x.v
+        qvel = (S @ v[..., None])[..., 0]
+        qacc = None
+        if input_count == len("qva"):
+            qacc = (S @ x.a[..., None] + self._compute_velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
+        qvel = np.array(np.broadcast_to(qvel, (n, self._model.nv)))
         if self.moving_base and base is not None:
             # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
-            at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
+            at, back = self._indices[0].qvel, np.swapaxes(_make_rotation_matrix(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
-            rates[:, at : at + 3] = velocity[..., :3]
-            rates[:, at + 3 : at + 6] = (back @ velocity[..., 3:, None])[..., 0]
-            if second is not None:
-                second[:, at : at + 3] = acceleration[..., :3]
-                second[:, at + 3 : at + 6] = (back @ acceleration[..., 3:, None])[..., 0]
-        return qpos, rates, second
+            qvel[:, at : at + 3] = velocity[..., :3]
+            qvel[:, at + 3 : at + 6] = (back @ velocity[..., 3:, None])[..., 0]
+            if qacc is not None:
+                qacc[:, at : at + 3] = acceleration[..., :3]
+                qacc[:, at + 3 : at + 6] = (back @ acceleration[..., 3:, None])[..., 0]
+        return qpos, qvel, qacc
 
-    def _velocity_matrix(self, q: FloatArray) -> FloatArray:
+    def _compute_velocity_matrix(self, q: FloatArray) -> FloatArray:
         """Return S with qvel = S v."""
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
@@ -353,7 +356,7 @@ class MujocoOracle(Oracle):
             if v < 0:
                 continue
             if joint.kind in _REPLACEMENT_JOINTS:
-                R, slides = _rotation_of_joint(joint, q)
+                R, slides = _compute_joint_rotations(joint, q)
                 S[:, at : at + slides, v : v + slides] = R
                 rotations = np.arange(slides, _JOINT_SIZES[joint.kind][1])
                 S[:, at + rotations, v + rotations] = 1.0
@@ -361,16 +364,13 @@ class MujocoOracle(Oracle):
                 S[:, at, v] = joint.multiplier
         return S
 
-    def _velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative of S.
-
-        For floating and planar joints, R' = R [w]x.
-        """
+    def _compute_velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Return the time derivative of S: R' = R [w]x for floating and planar joints."""
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, first = joint.qvel, joint.v
             if first >= 0 and joint.kind in _REPLACEMENT_JOINTS:
-                R, slides = _rotation_of_joint(joint, q)
+                R, slides = _compute_joint_rotations(joint, q)
                 w = np.zeros((len(q), 3))
                 w[:, (0 if slides == 3 else 2) :] = v[:, first + slides : first + _JOINT_SIZES[joint.kind][1]]
                 w_cross = np.cross(w[:, None, :], np.eye(3)[None]).swapaxes(-1, -2)
@@ -378,30 +378,22 @@ class MujocoOracle(Oracle):
         return S_rate
 
 
-def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return a joint's rotations.
-
-    Returns:
-        Planar joint: (n, 2, 2) rotation matrices, and 2.
-        Floating joint: (n, 3, 3) rotation matrices, and 3.
-    """
+def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
+    """Return (n, 2, 2) rotations and 2 for a planar joint, (n, 3, 3) rotations and 3 for a floating joint."""
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
-        return _rotation(_unit_quaternion(coordinates)), 3
+        return _make_rotation_matrix(_normalise_quaternion(coordinates)), 3
     c, s = np.cos(coordinates[:, 2]), np.sin(coordinates[:, 2])
     return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), 2
 
 
-def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
+def _normalise_quaternion(coordinates: FloatArray) -> FloatArray:
     quaternion = coordinates[:, 3:]
-    return _scalar_first(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
+    return _move_scalar_first(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    """Move all mass to the root.
-
-    The model's centre of mass is then exactly the root's origin.
-    """
+    # The model's centre of mass is then exactly the root's origin.
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
         mass[:] = 0.0
@@ -439,21 +431,21 @@ def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[
         children[WORLD] = [_Joint("root_joint", root_joint, WORLD, root)]
         root = WORLD
 
-    def joints_of(link: str) -> list[_Joint]:
+    def find_child_joints(link: str) -> list[_Joint]:
         return sorted(children.get(link, []), key=lambda joint: joint.name.encode(), reverse=True)
 
-    joints, stack = list[_Joint](), joints_of(root)
+    joints, stack = list[_Joint](), find_child_joints(root)
     while stack:
         joints.append(stack.pop())
-        stack += joints_of(joints[-1].child)
+        stack += find_child_joints(joints[-1].child)
     return joints, [root, *(joint.child for joint in joints)]
 
 
-def _scalar_first(quaternion: FloatArray) -> FloatArray:
+def _move_scalar_first(quaternion: FloatArray) -> FloatArray:
     return np.roll(quaternion, 1, axis=-1)
 
 
-def _rotation(quaternion: FloatArray) -> FloatArray:
+def _make_rotation_matrix(quaternion: FloatArray) -> FloatArray:
     w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

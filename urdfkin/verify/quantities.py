@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 SIX_VECTOR_LABELS = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
-def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
+def make_oracle_call(name: str) -> Callable[[Oracle, QueryBatch], Any]:
     return lambda oracle, query: getattr(oracle, name)(query)
 
 
-_bound = lazy_import("urdfkin.verify.bounds:make_bound")
+_make_bound = lazy_import("urdfkin.verify.bounds:make_bound")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,7 +53,8 @@ class Quantity:
         inputs: "q", "qv" or "qva".
         shape: Shape of one result, for example (6, "nv").
         compute: `compute(plan, *inputs, reference, base=, out=, threads=)` returns urdfkin's results.
-            If `recursive` is False, `compute` may have other arguments.
+            If `recursive` is False, `compute` may have other arguments. If `has_reference` is False,
+            `compute`, `scale` and `compute_intervals` have no argument `reference`.
         ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
@@ -64,8 +65,8 @@ class Quantity:
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
         recursive: True if one forward recursion computes the result, without further arguments such as
             `gravity`.
-        in_validation: Whether `validate` compares the quantity. False for Hessians, which are nv times
-            larger than Jacobians.
+        in_validation: `validate` compares the quantity if `recursive` and `in_validation` are True. False for
+            Hessians, which are nv times larger than Jacobians.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.
     """
@@ -100,7 +101,7 @@ class Quantity:
         return self.name.replace(" ", "_")
 
     @property
-    def axes(self) -> int:
+    def ndim(self) -> int:
         return len(self.shape)
 
     @property
@@ -113,20 +114,20 @@ class Quantity:
 
         return tuple(Reference) if self.has_reference else (None,)
 
-    def result_shape(self, rates: int) -> tuple[int, ...]:
-        return tuple(rates if size == "nv" else size for size in self.shape)
+    def result_shape(self, nv: int) -> tuple[int, ...]:
+        return tuple(nv if size == "nv" else size for size in self.shape)
 
     def compute_results(
-        self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
+        self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **options: Any
     ) -> FloatArray:
         results: FloatArray = self.compute(
-            plan, *inputs[: len(self.inputs)], *self._reference_arguments(reference), **how
+            plan, *inputs[: len(self.inputs)], *self._reference_arguments(reference), **options
         )
         return results
 
     def bound(self, plan: CompiledTree, magnitudes: Magnitudes, reference: Reference | None) -> Bound:
         scale = self.scale(plan, magnitudes, *self._reference_arguments(reference))
-        bound: Bound = _bound(scale, self.factors, magnitudes, *self._reference_arguments(reference))
+        bound: Bound = _make_bound(scale, self.factors, magnitudes, *self._reference_arguments(reference))
         return bound
 
     def enclose(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
@@ -145,7 +146,7 @@ PLACEMENT = Quantity(
     shape=(4, 4),
     equations=("7.77",),
     compute=lazy_import("urdfkin.compiled.evaluate:placements"),
-    ask_oracle=oracle_method("placements"),
+    ask_oracle=make_oracle_call("placements"),
     scale=lazy_import("urdfkin.verify.bounds:placement_scale"),
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:placement_values"),
     factors=1,
@@ -173,7 +174,7 @@ VELOCITY = Quantity(
     shape=(6,),
     equations=("7.127", "7.128"),
     compute=lazy_import("urdfkin.compiled.evaluate:velocities"),
-    ask_oracle=oracle_method("velocities"),
+    ask_oracle=make_oracle_call("velocities"),
     scale=lazy_import("urdfkin.verify.bounds:velocity_scale"),
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:velocity_values"),
     factors=2,
@@ -192,8 +193,8 @@ JACOBIAN = Quantity(
     shape=(6, "nv"),
     equations=("7.85",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobians"),
-    ask_oracle=oracle_method("jacobians"),
-    blocks=oracle_method("jacobian_blocks"),
+    ask_oracle=make_oracle_call("jacobians"),
+    blocks=make_oracle_call("jacobian_blocks"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_scale"),
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
@@ -211,7 +212,7 @@ JACOBIAN_RATE = Quantity(
     shape=(6, "nv"),
     equations=("7.126",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobian_rates"),
-    ask_oracle=oracle_method("jacobian_rates"),
+    ask_oracle=make_oracle_call("jacobian_rates"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_rate_scale"),
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:jacobian_rate_values"),
     factors=3,
@@ -230,7 +231,7 @@ HESSIAN = Quantity(
     shape=(6, "nv", "nv"),
     equations=("7.85", "7.126"),
     compute=lazy_import("urdfkin.compiled.evaluate:hessians"),
-    ask_oracle=oracle_method("hessians"),
+    ask_oracle=make_oracle_call("hessians"),
     scale=lazy_import("urdfkin.verify.bounds:hessian_scale"),
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:hessian_values"),
     factors=3,
@@ -250,7 +251,7 @@ ACCELERATION = Quantity(
     shape=(6,),
     equations=("7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:accelerations"),
-    ask_oracle=oracle_method("accelerations"),
+    ask_oracle=make_oracle_call("accelerations"),
     scale=lazy_import("urdfkin.verify.bounds:acceleration_scale"),
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:acceleration_values"),
     factors=3,
@@ -309,7 +310,7 @@ SCREWS = replace(
     name="screws",
     title="data.J",
     shape=(6,),
-    ask_oracle=oracle_method("screws"),
+    ask_oracle=make_oracle_call("screws"),
     blocks=None,
     object_kind="columns",
     heading="data.J",
@@ -336,19 +337,19 @@ QUANTITIES = {
 }
 
 
-def recursive_quantities(of: str = "frames") -> list[Quantity]:
-    return [row for row in QUANTITIES.values() if row.recursive and row.object_kind == of]
+def recursive_quantities(object_kind: str = "frames") -> list[Quantity]:
+    return [row for row in QUANTITIES.values() if row.recursive and row.object_kind == object_kind]
 
 
-def validated_quantities(of: str = "frames") -> list[Quantity]:
-    return [row for row in recursive_quantities(of) if row.in_validation]
+def validated_quantities(object_kind: str = "frames") -> list[Quantity]:
+    return [row for row in recursive_quantities(object_kind) if row.in_validation]
 
 
-def compared_titles() -> str:
+def format_validated_titles() -> str:
     return _join_titles([row.title for row in validated_quantities()])
 
 
-def uncompared_titles() -> str:
+def format_unvalidated_titles() -> str:
     return _join_titles(
         [
             row.title
@@ -377,7 +378,7 @@ def find_quantity(name: str) -> Quantity:
     return found
 
 
-def replay_line(
+def format_replay_command(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
     """Return a shell command that repeats a sample.
@@ -385,7 +386,7 @@ def replay_line(
     The command contains all digits of the numbers.
 
     >>> from urdfkin.urdf.sources import Origin
-    >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
+    >>> format_replay_command(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
     "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
     """
     words = ["urdfkin", command, origin.command_line, "--frame", shlex.quote(frame)]

@@ -5,7 +5,7 @@ axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
 yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
 normalise axes. The report separates these faults from other differences. For a missing number, yourdfpy
-returns None. The comparison replaces None by the default value of the URDF specification.
+returns None. The comparison replaces None by urdfkin's default value.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
 #: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
-#: A sine and a cosine have an error of one eps each.
-#: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
+#: An entry is a b c + d e with sines and cosines a to e, and |a b c| + |d e| <= 1.
+#: Each sine and cosine has a relative error of at most one eps, which changes the entry by at most 3 eps.
+#: Rounding the products and the sum changes the entry by at most 1.5 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference between two programs' normalised axes, per component.
 #: In urdfkin and yourdfpy, the relative error of an axis's length is at most 2 eps.
@@ -71,7 +72,7 @@ def compare_with_yourdfpy(
 ) -> SecondReading:
     """Compare yourdfpy's tree with urdfkin's tree.
 
-    If `root_joint` is True, the tree's first joint is not compared.
+    If `root_joint` is True, the tree's first link and first joint are not compared.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     # A document type declaration can make yourdfpy read other files.
@@ -80,9 +81,9 @@ def compare_with_yourdfpy(
     try:
         robot = read_with_yourdfpy(text)
     except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
-        words = " ".join(str(error).split()) or "no message"
+        message = " ".join(str(error).split()) or "no message"
         return SecondReading(
-            by, unread=escape_unprintable(f"{type(error).__name__}: {words}")[:_MAX_QUOTE_LENGTH]
+            by, unread=escape_unprintable(f"{type(error).__name__}: {message}")[:_MAX_QUOTE_LENGTH]
         )
     ours = {
         joint.name: (joint.original, tree.links[joint.parent], tree.links[i + 1])
@@ -152,21 +153,21 @@ def _compare_joints(
             yield "axis", "does not normalise an axis"
     if joint.kind is not JointKind.FIXED:
         limit = joint.limit and {x: getattr(joint.limit, x) for x in (*_LOWER_UPPER, *_VELOCITY_EFFORT)}
-        if (found := _read_limit(theirs)) != limit:
-            yield f"limit {found}, not {limit}", ""
+        if (their_limit := _read_limit(theirs)) != limit:
+            yield f"limit {their_limit}, not {limit}", ""
     if mimic and rule != joint.mimic:
         yield f"mimic rule {rule}, not {joint.mimic}", ""
 
 
 def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
-    """Return the limit with the URDF's default values."""
+    """Return the limit with urdfkin's default values."""
     if joint.limit is None:
         return None
     bounded = joint.type in _BOUNDED_KINDS
     bounds = {x: (getattr(joint.limit, x) or 0.0) if bounded else None for x in _LOWER_UPPER}
     others = {x: getattr(joint.limit, x) for x in _VELOCITY_EFFORT}
-    endless = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
-    return {x: endless[x] if value is None else value for x, value in {**bounds, **others}.items()}
+    unlimited = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
+    return {x: unlimited[x] if value is None else value for x, value in {**bounds, **others}.items()}
 
 
 def _read_mimic_rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
@@ -190,10 +191,10 @@ def _find_quaternion_joints(text: str) -> set[str]:
 
 
 def _compare_names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    found, own = Counter(iter(theirs)), Counter(iter(ours))
-    for name in found.keys() | own.keys():
-        if found[name] != own[name]:
-            yield f"{what} {name}: yourdfpy finds {found[name]}, urdfkin finds {own[name]}"
+    their_counts, our_counts = Counter(iter(theirs)), Counter(iter(ours))
+    for name in their_counts.keys() | our_counts.keys():
+        if their_counts[name] != our_counts[name]:
+            yield f"{what} {name}: yourdfpy finds {their_counts[name]}, urdfkin finds {our_counts[name]}"
 
 
 def _shorten(differences: list[str]) -> list[str]:

@@ -15,8 +15,9 @@
 
     error of a sum of m products <= m eps * (sum of the absolute values of the products)
 
-*Range.* No intermediate value leaves the range of doubles: the numbers of a norm are divided by the largest
-number, and products are computed from mantissas and exponents.
+*Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. The
+numbers of a norm are divided by the largest number, and products are computed from mantissas and exponents.
+If the residual overflows, the lower bound is 0 and the upper bound is inf.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
 #: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
-_RELATIVE_ERROR = 256.0 * EPS
+_RELATIVE_ROUNDING_ERROR = 256.0 * EPS
 #: Maximum number of samples in the printed table.
-_MAX_ROWS = 10
+_MAX_PRINTED_SAMPLES = 10
 
 
 class BoundedArray(NamedTuple):
@@ -91,23 +92,24 @@ class SingularValues(Displayable):
         if shape:
             n, sigma = math.prod(shape), self.values.value
             flat = [x.reshape(n, *x.shape[len(shape) :]) for x in (sigma, self.condition.value)]
-            size, ranks = self.manipulability.value.ravel(), (self.values.lower > 0.0).sum(axis=-1).ravel()
+            manipulability = self.manipulability.value.ravel()
+            ranks = (self.values.lower > 0.0).sum(axis=-1).ravel()
             rows: list[list[str | float]] = [
                 [str(list(index)).strip("[]"), *values.tolist(), condition, w, f"{rank} of {k}"]
                 for index, values, condition, w, rank in zip(
-                    np.ndindex(*shape), flat[0], flat[1].tolist(), size.tolist(), ranks, strict=True
+                    np.ndindex(*shape), flat[0], flat[1].tolist(), manipulability.tolist(), ranks, strict=True
                 )
             ]
-            heads = ["sample", *names, "condition", "manipulability", "rank"]
-            rest = len(rows) - _MAX_ROWS
-            more = [f"... and {rest} more samples"] if rest > 0 else []
-            return TextDocument(title, [Table(heads, rows[:_MAX_ROWS]), *more])
-        lines = [[name, *(f"{side[i]:.15g}" for side in self.values)] for i, name in enumerate(names)]
-        for name, between in (("condition", self.condition), ("manipulability", self.manipulability)):
-            lines.append([name, *(f"{side:.15g}" for side in between)])
+            headers = ["sample", *names, "condition", "manipulability", "rank"]
+            remaining = len(rows) - _MAX_PRINTED_SAMPLES
+            more = [f"... and {remaining} more samples"] if remaining > 0 else []
+            return TextDocument(title, [Table(headers, rows[:_MAX_PRINTED_SAMPLES]), *more])
+        lines = [[name, *(f"{number[i]:.15g}" for number in self.values)] for i, name in enumerate(names)]
+        for name, bounded in (("condition", self.condition), ("manipulability", self.manipulability)):
+            lines.append([name, *(f"{number:.15g}" for number in bounded)])
         table = Table(["", "value", "lower bound", "upper bound"], lines)
-        found = self.singularity() if self.frame_jacobian is not None else None
-        return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
+        singularity = self.singularity() if self.frame_jacobian is not None else None
+        return TextDocument(title, [table, *(str(singularity).splitlines() if singularity else [])])
 
     def singularity(self, *sample: int) -> Singularity:
         """Explain a loss of rank in one configuration.
@@ -126,8 +128,8 @@ class SingularValues(Displayable):
         The axes of joints joint_1 and joint_2 lie in one plane with the origin of tip.
         """
         shape = self.values.value.shape[:-1]
-        inside = len(sample) == len(shape) and all(-n <= i < n for i, n in zip(sample, shape, strict=True))
-        if not inside or self.frame_jacobian is None:
+        exists = len(sample) == len(shape) and all(-n <= i < n for i, n in zip(sample, shape, strict=True))
+        if not exists or self.frame_jacobian is None:
             raise InputError("no such configuration", found=str(sample), where=f"a batch of shape {shape}")
         bounds = self.values.lower[sample], self.values.upper[sample]
         return explain_singularity(self.frame_jacobian, sample, self.rows, *bounds)
@@ -136,7 +138,7 @@ class SingularValues(Displayable):
     def manipulability(self) -> BoundedArray:
         """Product of the singular values, (...): Yoshikawa's manipulability sqrt(det J J^T).
 
-        If J has more rows than columns, the manipulability is sqrt(det J^T J).
+        If J has more rows than columns, the manipulability is sqrt(det J^T J). Without columns, it is 0.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -145,16 +147,16 @@ class SingularValues(Displayable):
         0.1683
         """
         if not self.values.value.shape[-1]:
-            nothing = np.zeros(self.values.value.shape[:-1])
-            return BoundedArray(nothing, nothing, nothing)
+            zero = np.zeros(self.values.value.shape[:-1])
+            return BoundedArray(zero, zero, zero)
         value, lower, upper = map(_product, self.values)
-        return BoundedArray(value, np.maximum(_round_down(lower), 0.0), _round_up(upper))
+        return BoundedArray(value, np.maximum(_bound_below(lower), 0.0), _bound_above(upper))
 
     @cached_property
     def condition(self) -> BoundedArray:
         """Condition number (...): the largest singular value divided by the smallest.
 
-        The upper bound is inf if the smallest value may be 0.
+        The upper bound is inf if the smallest value may be 0. Without columns, all numbers are NaN.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -164,10 +166,10 @@ class SingularValues(Displayable):
         """
         value, lower, upper = self.values
         if not value.shape[-1]:
-            nothing = np.full(value.shape[:-1], np.nan)
-            return BoundedArray(nothing, nothing, nothing)
+            nan = np.full(value.shape[:-1], np.nan)
+            return BoundedArray(nan, nan, nan)
         with np.errstate(divide="ignore", over="ignore", under="ignore", invalid="ignore"):
-            least, middle, most = (
+            least, value_ratio, most = (
                 np.where(small > 0.0, large / small, np.inf)
                 for large, small in (
                     (lower[..., 0], upper[..., -1]),
@@ -175,7 +177,7 @@ class SingularValues(Displayable):
                     (upper[..., 0], lower[..., -1]),
                 )
             )
-        return BoundedArray(middle, np.maximum(_round_down(least), 1.0), _round_up(most))
+        return BoundedArray(value_ratio, np.maximum(_bound_below(least), 1.0), _bound_above(most))
 
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q.
@@ -198,68 +200,70 @@ class SingularValues(Displayable):
         """
         value = self.values.value
         count = value.shape[-1]
-        others = np.ones_like(value)
+        other_products = np.ones_like(value)
         for k in range(count):
-            others[..., k] = _product(np.delete(value, k, axis=-1))
-        weights = (self.U * others[..., np.newaxis, :]) @ np.swapaxes(self.V, -1, -2)
+            other_products[..., k] = _product(np.delete(value, k, axis=-1))
+        weights = (self.U * other_products[..., np.newaxis, :]) @ np.swapaxes(self.V, -1, -2)
         batch, (rows, nv) = weights.shape[:-2], weights.shape[-2:]
         derivatives = H[..., self.rows, :, :].reshape(*batch, rows * nv, nv)
-        slopes: FloatArray = (weights.reshape(*batch, 1, rows * nv) @ derivatives)[..., 0, :]
+        gradient: FloatArray = (weights.reshape(*batch, 1, rows * nv) @ derivatives)[..., 0, :]
         if count:
-            slopes[self.values.lower[..., -1] <= 0.0] = np.nan
-        return slopes
+            gradient[self.values.lower[..., -1] <= 0.0] = np.nan
+        return gradient
 
 
 def singular_values(
     J: FloatArray,
     error: FloatArray,
-    moving: NDArray[np.bool_],
+    is_active: NDArray[np.bool_],
     rows: slice = slice(None),
-    columns: FrameJacobian | None = None,
+    frame_jacobian: FrameJacobian | None = None,
 ) -> SingularValues:
     """Return singular values with guaranteed bounds.
 
-    `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are always 0.
+    `error` bounds the error of each number of J. `is_active` (nv,) is False for left-out columns.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
     ([4.0, 3.0], True)
     """
-    A, off = (x[..., rows, :][..., moving] for x in (J, error))
+    A, A_error = (x[..., rows, :][..., is_active] for x in (J, error))
     U, s, Vt = np.linalg.svd(A, full_matrices=False)
     V = np.zeros((*J.shape[:-2], J.shape[-1], s.shape[-1]))
-    V[..., moving, :] = Vt.swapaxes(-1, -2)
+    V[..., is_active, :] = Vt.swapaxes(-1, -2)
     terms = s.shape[-1] + 4
     with np.errstate(over="ignore", invalid="ignore"):
-        left = np.abs(A - (U * s[..., np.newaxis, :]) @ Vt)
+        difference = np.abs(A - (U * s[..., np.newaxis, :]) @ Vt)
         sizes = np.abs(A) + (np.abs(U) * s[..., np.newaxis, :]) @ np.abs(Vt)
-        residual = _norm(left + terms * (EPS * sizes + SMALLEST_NORMAL) + off)
-        skew = _orthogonality_error(U) + _orthogonality_error(Vt.swapaxes(-1, -2))
-        lower = s * _round_down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
-        upper = s * _round_up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
+        residual = _bound_norm(difference + terms * (EPS * sizes + SMALLEST_NORMAL) + A_error)
+        defect = _bound_orthogonality_error(U) + _bound_orthogonality_error(Vt.swapaxes(-1, -2))
+        lower = s * _bound_below(1.0 - defect)[..., np.newaxis] - residual[..., np.newaxis]
+        upper = s * _bound_above(1.0 + defect)[..., np.newaxis] + residual[..., np.newaxis]
     # NaN becomes 0 as a lower bound, and inf as an upper bound.
     lower, upper = (
-        np.nan_to_num(_round_down(lower), nan=0.0),
-        np.nan_to_num(_round_up(upper), nan=np.inf, posinf=np.inf),
+        np.nan_to_num(_bound_below(lower), nan=0.0),
+        np.nan_to_num(_bound_above(upper), nan=np.inf, posinf=np.inf),
     )
-    return SingularValues(rows, BoundedArray(s, np.maximum(lower, 0.0), upper), U, V, columns)
+    return SingularValues(rows, BoundedArray(s, np.maximum(lower, 0.0), upper), U, V, frame_jacobian)
 
 
-def _orthogonality_error(U: FloatArray) -> FloatArray:
+def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
     """Bound the Frobenius norm |U^T U - I|."""
-    back = U.swapaxes(-1, -2)
-    rounding = (U.shape[-2] + 2) * EPS * (np.abs(back) @ np.abs(U))
-    return _norm(np.abs(back @ U - np.eye(U.shape[-1])) + rounding)
+    Ut = U.swapaxes(-1, -2)
+    rounding = (U.shape[-2] + 2) * EPS * (np.abs(Ut) @ np.abs(U))
+    return _bound_norm(np.abs(Ut @ U - np.eye(U.shape[-1])) + rounding)
 
 
-def _norm(E: FloatArray) -> FloatArray:
+def _bound_norm(E: FloatArray) -> FloatArray:
     """Return an upper bound on each matrix's Frobenius norm; all numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
     # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
-    return _round_up(norm)
+        # `_RELATIVE_ROUNDING_ERROR` does not cover the sum of many squares.
+        norm *= 1.0 + E.shape[-2] * E.shape[-1] * EPS
+    return _bound_above(norm)
 
 
 def _product(x: FloatArray) -> FloatArray:
@@ -270,17 +274,17 @@ def _product(x: FloatArray) -> FloatArray:
     return product
 
 
-def _round_up(x: FloatArray) -> FloatArray:
+def _bound_above(x: FloatArray) -> FloatArray:
     """Return an upper bound on the exact number that was computed as x."""
     with np.errstate(over="ignore", under="ignore"):
-        return np.nextafter(x + np.abs(x) * _RELATIVE_ERROR, np.inf)
+        return np.nextafter(x + np.abs(x) * _RELATIVE_ROUNDING_ERROR, np.inf)
 
 
-def _round_down(x: FloatArray) -> FloatArray:
+def _bound_below(x: FloatArray) -> FloatArray:
     """Return a lower bound on the exact number that was computed as x.
 
     x = inf: the bound is the largest double
     """
     with np.errstate(under="ignore", invalid="ignore"):
-        inside = np.nextafter(x - np.abs(x) * _RELATIVE_ERROR, -np.inf)
-    return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)
+        bound = np.nextafter(x - np.abs(x) * _RELATIVE_ROUNDING_ERROR, -np.inf)
+    return np.where(np.isposinf(x), np.finfo(np.float64).max, bound)

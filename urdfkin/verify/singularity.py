@@ -36,14 +36,13 @@ _MAX_COLUMNS = 16
 #: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
 _ROUNDINGS = 16.0
 #: At random configurations, singular values count as 0 if they are below this fraction of the norm.
-_NEGLIGIBLE = 1e-9
+#: Unit vectors count as parallel if the smaller singular values are below this number.
+_RANK_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class FrameJacobian:
     """A robot's Jacobian with names.
-
-    `sample_jacobians` always uses a fixed base. With a moving base, permanently lost directions are unknown.
 
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, world axes.
@@ -51,7 +50,8 @@ class FrameJacobian:
         is_revolute: (nv,) True: revolute joint. False: prismatic joint.
             None: planar joint, floating joint, or joint that a mimic joint follows.
         active_entries: (6, nv) False for entries that are always 0.
-        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations.
+        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
+            base. Directions without motion can be different with a moving base.
         moving_base: Whether a base motion is given.
     """
 
@@ -66,13 +66,13 @@ class FrameJacobian:
 
 
 def find_revolute_columns(tree: KinematicTree) -> tuple[bool | None, ...]:
-    turns: list[bool | None] = [None] * tree.nv
-    moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
-    for i, joint in moving:
-        at = tree.v_index[i]
-        if joint.kind.nv == 1 and sum(tree.v_index[k] == at for k, _ in moving) == 1:
-            turns[at] = joint.kind.turns
-    return tuple(turns)
+    is_revolute: list[bool | None] = [None] * tree.nv
+    moving_joints = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
+    for i, joint in moving_joints:
+        column = tree.v_index[i]
+        if joint.kind.nv == 1 and sum(tree.v_index[k] == column for k, _ in moving_joints) == 1:
+            is_revolute[column] = joint.kind.turns
+    return tuple(is_revolute)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,74 +119,83 @@ class Singularity(Displayable):
 
 
 def explain_singularity(
-    columns: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
+    frame_jacobian: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
     """Explain a loss of rank in one configuration.
 
     `lower` and `upper` (k,) bound the singular values.
     """
-    rank, full = int((lower > 0.0).sum()), len(lower)
-    if rank == full:
-        least = float(upper[-1]) if full else 0.0
-        return Singularity(rank, full, least, np.zeros((0, 6)), np.zeros((0, columns.J.shape[-1])), ())
-    return _Explanation(columns, sample, rows, rank).result(full, float(upper[-1]))
+    rank, full_rank = int((lower > 0.0).sum()), len(lower)
+    if rank == full_rank:
+        smallest_value_bound = float(upper[-1]) if full_rank else 0.0
+        return Singularity(
+            rank,
+            full_rank,
+            smallest_value_bound,
+            np.zeros((0, 6)),
+            np.zeros((0, frame_jacobian.J.shape[-1])),
+            (),
+        )
+    return _SingularityExplainer(frame_jacobian, sample, rows, rank).explain(full_rank, float(upper[-1]))
 
 
-class _Explanation:
-    def __init__(self, columns: FrameJacobian, sample: tuple[int, ...], rows: slice, rank: int) -> None:
-        J, error = columns.J[sample], columns.error[sample]
+class _SingularityExplainer:
+    def __init__(
+        self, frame_jacobian: FrameJacobian, sample: tuple[int, ...], rows: slice, rank: int
+    ) -> None:
+        J, error = frame_jacobian.J[sample], frame_jacobian.error[sample]
         chosen = np.zeros(6, dtype=bool)
         chosen[rows] = True
         self._linear_only, self._angular_only = not chosen[3:].any(), not chosen[:3].any()
-        active = columns.active_entries & chosen[:, None]
+        active = frame_jacobian.active_entries & chosen[:, None]
         self._rows, self._moving = np.flatnonzero(active.any(axis=1)), np.flatnonzero(active.any(axis=0))
-        self._J, self._error, self._columns, self._rank = J, error, columns, rank
+        self._J, self._error, self._frame_jacobian, self._rank = J, error, frame_jacobian, rank
         self._A = J[np.ix_(self._rows, self._moving)]
         self._A_error = error[np.ix_(self._rows, self._moving)]
-        self._names = [columns.joints[i] for i in self._moving]
+        self._names = [frame_jacobian.joints[i] for i in self._moving]
 
-    def result(self, full: int, least: float) -> Singularity:
+    def explain(self, full_rank: int, smallest_value_bound: float) -> Singularity:
         U, s, Vt = np.linalg.svd(self._A)
-        self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
+        self._noise = 8.0 * self._bound_matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
-        motions[:, self._moving] = _sparse_basis(Vt[self._rank :])
-        usual, never = self._compare_samples()
+        motions[:, self._moving] = _make_sparse_basis(Vt[self._rank :])
+        generic_rank, fixed_directions = self._compare_samples()
         directions = U[:, self._rank :].T
-        directions = _orthonormal_basis(directions - directions @ never @ never.T)
+        directions = _make_orthonormal_basis(directions - directions @ fixed_directions @ fixed_directions.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
         # If such a direction depends on q, it looks like a direction that is lost only at this q.
-        known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
-        lost = np.zeros((len(directions) if known else 0, 6))
-        if known:
-            lost[:, self._rows] = _sparse_basis(directions)
+        is_known = len(directions) == generic_rank - self._rank and not (
+            self._frame_jacobian.moving_base and fixed_directions.size
+        )
+        lost = np.zeros((len(directions) if is_known else 0, 6))
+        if is_known:
+            lost[:, self._rows] = _make_sparse_basis(directions)
             lost /= np.linalg.norm(lost, axis=1, keepdims=True)
-            first = np.abs(lost).argmax(axis=1)[:, None]
-            lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
-        if self._rank == usual:
+            largest = np.abs(lost).argmax(axis=1)[:, None]
+            lost = lost * np.sign(np.take_along_axis(lost, largest, axis=1)) + 0.0
+        if self._rank == generic_rank:
             reasons = [
                 "The Jacobian has the same rank at random configurations."
                 " The arm causes the loss of rank, not this configuration."
             ]
         else:
             reasons = [*self._describe_directions(lost), *self._describe_causes(lost, motions)]
-        return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
+        return Singularity(self._rank, full_rank, smallest_value_bound, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Compare the Jacobians at random configurations.
-
-        Returns:
-            The largest rank, and the directions without motion in all samples.
-        """
-        samples = self._columns.sample_jacobians()[:, self._rows[:, None], self._moving]
-        usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
+        """Return the largest rank, and orthonormal columns of directions without motion in all samples."""
+        samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
+        generic_rank = max(
+            int(np.linalg.matrix_rank(J, tol=_RANK_TOLERANCE * np.linalg.norm(J))) for J in samples
+        )
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
-        return usual, U[:, int((s > _NEGLIGIBLE * s[0]).sum()) :]
+        return generic_rank, U[:, int((s > _RANK_TOLERANCE * s[0]).sum()) :]
 
     def _remove_noise(self, rows: FloatArray) -> FloatArray:
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _describe_directions(self, lost: FloatArray) -> Iterator[str]:
-        frame = self._columns.frame
+        frame = self._frame_jacobian.frame
         for u in self._remove_noise(lost):
             linear, angular = _format_vector(u[:3]), _format_vector(u[3:])
             if not u[3:].any():
@@ -199,111 +208,116 @@ class _Explanation:
 
     def _describe_causes(self, lost: FloatArray, motions: FloatArray) -> Iterator[str]:
         if sets := list(self._find_dependent_sets()):
-            yield from map(self._describe_dependence, self._merge_pairs(sets))
+            yield from map(self._describe_dependence, self._merge_overlapping_pairs(sets))
             return
         if len(lost) == 1 and (line := self._describe_common_line(self._remove_noise(lost)[0])) is not None:
             yield line
         if len(motions) == 1:
             yield self._describe_null_motion(motions[0, self._moving])
         else:
-            moved = np.flatnonzero(self._remove_noise(motions)[:, self._moving].any(axis=0))
-            joints = _join_names([self._names[i] for i in moved])
-            yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
+            moving = np.flatnonzero(self._remove_noise(motions)[:, self._moving].any(axis=0))
+            joints = _join_names([self._names[i] for i in moving])
+            frame = self._frame_jacobian.frame
+            yield f"{len(motions)} independent joint motions of {joints} do not move {frame}."
 
     def _find_dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield minimal sets of dependent columns."""
         if self._A.shape[1] > _MAX_COLUMNS:
             return
         found: list[set[int]] = []
         for size in range(1, min(_MAX_SET_SIZE, *self._A.shape) + 1):
-            for one in combinations(range(self._A.shape[1]), size):
-                if any(smaller <= set(one) for smaller in found):
+            for columns in combinations(range(self._A.shape[1]), size):
+                if any(smaller <= set(columns) for smaller in found):
                     continue
-                columns, off = self._A[:, one], self._A_error[:, one]
-                least = np.linalg.svd(columns, compute_uv=False)[-1]
-                if least <= np.linalg.norm(off) + self._rounding_error(columns):
-                    found.append(set(one))
-                    yield one
+                A, A_error = self._A[:, columns], self._A_error[:, columns]
+                smallest_value = np.linalg.svd(A, compute_uv=False)[-1]
+                if smallest_value <= np.linalg.norm(A_error) + self._bound_rounding_error(A):
+                    found.append(set(columns))
+                    yield columns
 
-    def _merge_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Merge overlapping pairs of dependent columns."""
+    def _merge_overlapping_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         joined: list[set[int]] = []
+        # In linear rows, a minimal set of three columns spans a plane, but three columns in merged pairs span
+        # a line. `_describe_linear_rows` does not describe the line.
         if self._linear_only:
             return sets
-        for pair in (set(one) for one in sets if len(one) == 2):
-            overlapping = [one for one in joined if one & pair]
-            joined = [one for one in joined if not one & pair] + [pair.union(*overlapping)]
-        return [*(tuple(sorted(one)) for one in joined), *(one for one in sets if len(one) != 2)]
+        for pair in (set(columns) for columns in sets if len(columns) == 2):
+            overlapping = [columns for columns in joined if columns & pair]
+            joined = [columns for columns in joined if not columns & pair] + [pair.union(*overlapping)]
+        return [
+            *(tuple(sorted(columns)) for columns in joined),
+            *(columns for columns in sets if len(columns) != 2),
+        ]
 
-    def _describe_dependence(self, one: tuple[int, ...]) -> str:
-        indices = self._moving[list(one)]
-        turns = [self._columns.is_revolute[i] for i in indices]
+    def _describe_dependence(self, columns: tuple[int, ...]) -> str:
+        indices = self._moving[list(columns)]
+        is_revolute = [self._frame_jacobian.is_revolute[i] for i in indices]
         reason = None
-        if None not in turns:
+        if None not in is_revolute:
             if self._angular_only:
-                parallel = np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1
-                reason = (
-                    f"The axes of {self._name_joints(one)} are parallel{'' if parallel else ' to one plane'}."
-                )
+                are_parallel = np.linalg.matrix_rank(self._A[:, columns], tol=_RANK_TOLERANCE) == 1
+                plane = "" if are_parallel else " to one plane"
+                reason = f"The axes of {self._name_joints(columns)} are parallel{plane}."
             elif self._linear_only:
-                reason = self._describe_linear_rows(one, turns)
-            elif all(turns):
-                reason = self._describe_revolute_axes(one)
-            elif not any(turns) and np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1:
-                reason = f"{self._name_joints(one)} slide along parallel axes."
+                reason = self._describe_linear_rows(columns, is_revolute)
+            elif all(is_revolute):
+                reason = self._describe_revolute_axes(columns)
+            elif (
+                not any(is_revolute) and np.linalg.matrix_rank(self._A[:, columns], tol=_RANK_TOLERANCE) == 1
+            ):
+                reason = f"{self._name_joints(columns)} slide along parallel axes."
         if reason is not None:
             return reason
-        _, _, Vt = np.linalg.svd(self._A[:, one])
+        _, _, Vt = np.linalg.svd(self._A[:, columns])
         motion = np.zeros(len(self._names))
-        motion[list(one)] = Vt[-1]
+        motion[list(columns)] = Vt[-1]
         return self._describe_null_motion(motion)
 
-    def _describe_linear_rows(self, one: tuple[int, ...], turns: list[bool | None]) -> str | None:
-        frame = self._columns.frame
-        if len(one) == 1 and turns[0]:
-            return f"The axis of {self._name_joints(one)} passes through the origin of {frame}."
-        if len(one) == 2 and all(turns):
-            return f"The axes of {self._name_joints(one)} lie in one plane with the origin of {frame}."
-        if len(one) == 3:
-            return f"{self._name_joints(one)} move the origin of {frame} in one plane only."
+    def _describe_linear_rows(self, columns: tuple[int, ...], is_revolute: list[bool | None]) -> str | None:
+        frame = self._frame_jacobian.frame
+        if len(columns) == 1 and is_revolute[0]:
+            return f"The axis of {self._name_joints(columns)} passes through the origin of {frame}."
+        if len(columns) == 2 and all(is_revolute):
+            return f"The axes of {self._name_joints(columns)} lie in one plane with the origin of {frame}."
+        if len(columns) == 3:
+            return f"{self._name_joints(columns)} move the origin of {frame} in one plane only."
         return None
 
-    def _describe_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        indices = self._moving[list(one)]
+    def _describe_revolute_axes(self, columns: tuple[int, ...]) -> str | None:
+        indices = self._moving[list(columns)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
-        off = 2.0 * float(np.linalg.norm(self._error[:, indices])) * size
-        off += self._rounding_error(self._J[:, indices]) * size
-        parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= off).all())
-        axes = f"The axes of {self._name_joints(one)}"
+        tolerance = 2.0 * float(np.linalg.norm(self._error[:, indices])) * size
+        tolerance += self._bound_rounding_error(self._J[:, indices]) * size
+        are_parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= tolerance).all())
+        axes = f"The axes of {self._name_joints(columns)}"
         signs = np.sign(z @ z[0])[:, None]
-        if parallel and np.abs(v - signs * v[0]).max() <= off:
+        if are_parallel and np.abs(v - signs * v[0]).max() <= tolerance:
             return f"{axes} are collinear."
         # Three dependent lines that are parallel or concurrent are coplanar.
         # Four dependent lines that are parallel or concurrent need not be coplanar.
-        if parallel:
-            return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
+        if are_parallel:
+            return f"{axes} are parallel{' and lie in one plane' if len(columns) == 3 else ''}."
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
-        if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
+        if np.abs(crosses @ a - v.ravel()).max() > tolerance * float(np.linalg.cond(crosses)):
             return None
-        return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
+        return f"{axes} intersect in one point{' and lie in one plane' if len(columns) == 3 else ''}."
 
-    def _describe_common_line(self, u: FloatArray) -> str | None:
-        f, m = u[:3], u[3:]
+    def _describe_common_line(self, lost_direction: FloatArray) -> str | None:
+        f, m = lost_direction[:3], lost_direction[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
-        if not all(self._columns.is_revolute[i] for i in self._moving):
+        if not all(self._frame_jacobian.is_revolute[i] for i in self._moving):
             return None
-        off = 4.0 * self._matrix_error() * (1.0 + np.abs(self._A).max())
-        if abs(f @ m) > off * float(f @ f):
+        tolerance = 4.0 * self._bound_matrix_error() * (1.0 + np.abs(self._A).max())
+        if abs(f @ m) > tolerance * float(f @ f):
             return None
         point = np.cross(f, m) / (f @ f)
         return (
             f"Each axis intersects or is parallel to the line along {_format_vector(f / np.linalg.norm(f))}"
-            f" through the point at {_format_vector(point)} m from the origin of {self._columns.frame},"
-            " in world axes."
+            f" through the point at {_format_vector(point)} m"
+            f" from the origin of {self._frame_jacobian.frame}, in world axes."
         )
 
     def _describe_null_motion(self, motion: FloatArray) -> str:
@@ -313,22 +327,22 @@ class _Explanation:
             for name, x in zip(self._names, motion, strict=True)
             if abs(x) > np.sqrt(EPS)
         ]
-        return f"These joint velocities do not move {self._columns.frame}: {', '.join(parts)}."
+        return f"These joint velocities do not move {self._frame_jacobian.frame}: {', '.join(parts)}."
 
-    def _name_joints(self, one: Sequence[int]) -> str:
-        names = _join_names([self._names[i] for i in one])
-        return f"{'joint' if len(one) == 1 else 'joints'} {names}"
+    def _name_joints(self, columns: Sequence[int]) -> str:
+        names = _join_names([self._names[i] for i in columns])
+        return f"{'joint' if len(columns) == 1 else 'joints'} {names}"
 
-    def _matrix_error(self) -> float:
-        return float(np.linalg.norm(self._A_error)) + self._rounding_error(self._A)
+    def _bound_matrix_error(self) -> float:
+        return float(np.linalg.norm(self._A_error)) + self._bound_rounding_error(self._A)
 
     @staticmethod
-    def _rounding_error(A: FloatArray) -> float:
+    def _bound_rounding_error(A: FloatArray) -> float:
         return float(_ROUNDINGS * sum(A.shape) * EPS * np.linalg.norm(A))
 
 
-def _sparse_basis(rows: FloatArray) -> FloatArray:
-    """Return a sparse basis of the row space."""
+def _make_sparse_basis(rows: FloatArray) -> FloatArray:
+    """Apply Gauss-Jordan elimination. A single row stays unchanged."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -341,7 +355,7 @@ def _sparse_basis(rows: FloatArray) -> FloatArray:
     return basis
 
 
-def _orthonormal_basis(rows: FloatArray) -> FloatArray:
+def _make_orthonormal_basis(rows: FloatArray) -> FloatArray:
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     # Each singular value is 1 or 0, except for rounding.
     return Vt[: int((s > 0.5).sum())]

@@ -42,12 +42,11 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings, table_roundings
 from urdfkin.model.chain import make_chain
 from urdfkin.model.configuration import Samples
-from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
-_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
+#: The bound counts the sum of a table's lengths up to this multiple of the reach.
+#: No length in a table with Hayati rows exceeds this multiple (docs/dh.md).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -74,7 +73,7 @@ class TableCheck:
     Attributes:
         metres: Distance between the tips, m.
         radians: Angle between the orientations, rad.
-        units: Differences in units of eps * scale. The scale of an angle is 1.
+        units: Differences in units of eps * scale. The scale of the angle between orientations is 1.
         bound_ratios: Ratios of difference to bound.
         has_snapping: Whether the bound includes snapping.
         loss: Why very large lengths cause a difference, or None.
@@ -90,7 +89,7 @@ class TableCheck:
 
     @property
     def is_within_bounds(self) -> bool:
-        return all(share <= 1.0 for share in self.bound_ratios.values())
+        return all(ratio <= 1.0 for ratio in self.bound_ratios.values())
 
     @property
     def agrees(self) -> bool:
@@ -124,29 +123,32 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
             np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
             rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
         ),
-        "jacobian": _split_rows(jacobian(table, own_q) - motion.jacobian[..., columns]),
-        "acceleration": _split_rows(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
+        "jacobian": _find_linear_angular_maxima(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        "acceleration": _find_linear_angular_maxima(
+            acceleration(table, own_q, own_v, own_a) - motion.acceleration
+        ),
     }
-    size = compute_error_scales(tree, table, samples)
-    snap_effect = _SnapEffect(table, own_q, size)
-    units, shares = _compare_with_bounds(differences, size, snap_effect)
+    error_scales = compute_error_scales(tree, table, samples)
+    snap_effect = _SnapEffect(table, own_q, error_scales)
+    units, bound_ratios = _compare_with_bounds(differences, error_scales, snap_effect)
     loss = None
-    own = table_length(table)
-    if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
-        _, longer = _compare_with_bounds(differences, size.with_reach(own), snap_effect)
-        loss = _describe_loss(table) if max(longer.values()) <= 1.0 else None
+    table_length = sum_table_lengths(table)
+    if table.rows and max(bound_ratios.values()) > 1.0 and (table_length > error_scales.reach).any():
+        _, relaxed_ratios = _compare_with_bounds(
+            differences, error_scales.with_min_reach(table_length), snap_effect
+        )
+        loss = _describe_accuracy_loss(table) if max(relaxed_ratios.values()) <= 1.0 else None
     metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
-    snapped = bool(table.snap and table.snap.changes)
-    return TableCheck(len(own_q), metres, radians, units, shares, snapped, loss)
+    has_snapping = bool(table.snap and table.snap.changes)
+    return TableCheck(len(own_q), metres, radians, units, bound_ratios, has_snapping, loss)
 
 
-def table_length(table: DHTable) -> float:
+def sum_table_lengths(table: DHTable) -> float:
     """Return the sum of all lengths, with base and tool, m."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
-def _describe_loss(table: DHTable) -> str:
-    """Describe the longest length's rounding error."""
+def _describe_accuracy_loss(table: DHTable) -> str:
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -164,32 +166,34 @@ _Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
 def _compare_with_bounds(
-    differences: _Differences, size: ErrorScales, snap_effect: _SnapEffect
+    differences: _Differences, error_scales: ErrorScales, snap_effect: _SnapEffect
 ) -> tuple[dict[str, float], dict[str, float]]:
-    rates = size.rates**2 + size.accelerations
-    one = np.ones_like(size.reach)
-    columns = size.turning + size.sliding
-    reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
+    rates = error_scales.rates**2 + error_scales.accelerations
+    ones = np.ones_like(error_scales.reach)
+    columns = error_scales.turning + error_scales.sliding
+    reach, slides = error_scales.reach[:, None], 1.0 if error_scales.sliding.any() else 0.0
     #: Each quantity has one pair of numbers for linear differences, and one pair for angular differences.
     #: The first number of a pair is the scale of rounding errors; the second is the effect of snapping.
     #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
-        "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
+        "placement": ((error_scales.reach, snap_effect.metres), (ones, snap_effect.turn)),
         "jacobian": (
-            (size.turning * reach + size.sliding, snap_effect.jacobian[:, None] * columns),
-            (size.turning * one[:, None], snap_effect.turn * columns),
+            (error_scales.turning * reach + error_scales.sliding, snap_effect.jacobian[:, None] * columns),
+            (error_scales.turning * ones[:, None], snap_effect.turn * columns),
         ),
         "acceleration": (
-            ((size.reach + slides) * rates, snap_effect.acceleration * rates),
+            ((error_scales.reach + slides) * rates, snap_effect.acceleration * rates),
             (rates, 4.0 * snap_effect.turn * rates),
         ),
     }
-    units, shares = dict[str, float](), dict[str, float]()
+    units, bound_ratios = dict[str, float](), dict[str, float]()
     for name, halves in differences.items():
         pairs = list(zip(halves, limits[name], strict=True))
         units[name] = max(_max_ratio(x, scale * EPS) for x, (scale, _) in pairs)
-        shares[name] = max(_max_ratio(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
-    return units, shares
+        bound_ratios[name] = max(
+            _max_ratio(x, (scale.T * error_scales.rounding).T + snap) for x, (scale, snap) in pairs
+        )
+    return units, bound_ratios
 
 
 def _max_ratio(found: FloatArray, unit: FloatArray | float) -> float:
@@ -223,10 +227,10 @@ def compute_relative_motion(
     J_linear = J_tip[:, :3] - J_base[:, :3] - np.cross(J_base[:, 3:], r[..., None], axis=1)
     J_angular = J_tip[:, 3:] - J_base[:, 3:]
     w = vel[:, 0, 3:]
-    v_seen = vel[:, 1, :3] - vel[:, 0, :3] - np.cross(w, r)
+    v_relative = vel[:, 1, :3] - vel[:, 0, :3] - np.cross(w, r)
     alpha = acc[:, 1, 3:] - acc[:, 0, 3:] - np.cross(w, vel[:, 1, 3:] - w)
     linear = acc[:, 1, :3] - acc[:, 0, :3] - np.cross(acc[:, 0, 3:], r)
-    linear -= np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, v_seen)
+    linear -= np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, v_relative)
     placement = np.broadcast_to(np.eye(4), (len(r), 4, 4)).copy()
     Rt = np.swapaxes(R, -1, -2)
     placement[:, :3, :3] = Rt @ T[:, 1, :3, :3]
@@ -247,8 +251,8 @@ class ErrorScales:
         turning: (columns,) sum of |multiplier| over revolute joints
             on the paths from the root to the table's base and tip.
         sliding: (columns,) sum of |multiplier| over prismatic joints on these paths.
-        rates: (n,) sum of all |v|.
-        accelerations: (n,) sum of all |a|.
+        rates: (n,) sum of |multiplier v| over the joints on these paths.
+        accelerations: (n,) sum of |multiplier a| over these joints.
         rounding: (n,) relative error. The bound includes angles between axes that the table treats as
             parallel.
     """
@@ -260,7 +264,7 @@ class ErrorScales:
     accelerations: FloatArray
     rounding: FloatArray
 
-    def with_reach(self, metres: float) -> ErrorScales:
+    def with_min_reach(self, metres: float) -> ErrorScales:
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
@@ -288,12 +292,12 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
                 reach += value
             if mimicked_joint in names:
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
-    own = table_length(table)
-    reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
+    table_length = sum_table_lengths(table)
+    reach = np.maximum(reach, np.minimum(table_length, MAX_LENGTH_RATIO * reach))
     # `Joint.pinocchio_tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
-    counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
-    rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
+    roundings = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
+    rounding = EPS * roundings + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
@@ -307,16 +311,16 @@ class _SnapEffect:
     cross product of two axes: change <= 2 * turn
     """
 
-    def __init__(self, table: DHTable, own_q: FloatArray, size: ErrorScales) -> None:
+    def __init__(self, table: DHTable, own_q: FloatArray, error_scales: ErrorScales) -> None:
         self.turn, self.metres = 0.0, np.zeros(len(own_q))
         if table.snap is not None:
             values = table.coupling.values(own_q)
             by_name = {row.joint: values[:, i] for i, row in enumerate(table.rows)}
             self.turn, self.metres = table.snap.radians, self.metres + table.snap.bound(by_name)
-        self.jacobian = self.turn * (size.reach + 1.0) + 2.0 * self.metres
-        self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
+        self.jacobian = self.turn * (error_scales.reach + 1.0) + 2.0 * self.metres
+        self.acceleration = 2.0 * self.turn * (error_scales.reach + 2.0) + 4.0 * self.metres
 
 
-def _split_rows(six: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _find_linear_angular_maxima(six: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest absolute values of linear and of angular rows."""
     return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

@@ -48,7 +48,7 @@ _ROTATION_ROUNDINGS = 18.0
 _ORIGIN_ROUNDINGS = 3.0
 #: A prim's transform consists of operations, such as rotations.
 #: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.
-#: `_compare_prims` derives this bound.
+#: `_compare_prim_poses` derives this bound.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 
@@ -69,14 +69,18 @@ def read_usd(
     articulation: str | None = None,
     timeout: float = TIMEOUT,
 ) -> UsdReading:
-    """Read a USD robot in a separate process.
+    """Read a USD stage in a separate process.
 
     `variants` contains pairs (variant set, variant).
     `timeout` is in seconds.
+
+    Raises:
+        SourceError: The file is missing.
+        InputError: OpenUSD or urdfkin does not accept the stage, or the process ends without a robot.
     """
     version()
     path = expand_home(source)
-    read_bytes(path)  # `read_bytes` raises SourceError if the file is missing.
+    read_bytes(path)  # Raises SourceError.
     request = {
         "path": os.path.realpath(path),
         "name": str(path),
@@ -101,22 +105,23 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare a robot with OpenUSD's data."""
+    """Compare a robot with OpenUSD's data, and return a sentence about the result and a remark.
+
+    Raises:
+        OracleError: UsdPhysics reads a joint differently.
+    """
     joints = reading.answer["joints"]
-    share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
+    ratio = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
         f"compared with OpenUSD {version()}: UsdPhysics and urdfkin read the same {len(joints)} joints"
-        f" ({share:.1%} of the bound of single precision)"
+        f" ({ratio:.1%} of the bound of single precision)"
     )
-    rest, remarks = _compare_prims(verifier.tree, reading.answer)
+    rest, remarks = _compare_prim_poses(verifier.tree, reading.answer)
     return f"{line}; {rest}", remarks
 
 
 def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Compare a joint with OpenUSD's data.
-
-    Returns:
-        Largest ratio of difference to bound.
+    """Return the largest ratio of difference to bound.
 
     Bounds, with u = `SINGLE_ROUNDOFF`, the relative error of one rounding to single precision:
 
@@ -131,26 +136,25 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
         `_ORIGIN_ROUNDINGS` = 3
     """
     if theirs is None:
-        raise _error(f"{name}, joint {path}", "the parser does not find this joint")
+        raise _make_error(f"{name}, joint {path}", "the parser does not find this joint")
     if ours[:3] != theirs[:3]:
-        raise _error(f"{name}, joint {path}", f"{theirs[:3]} instead of {ours[:3]}")
-    size, shares = ours[8], [0.0]
+        raise _make_error(f"{name}, joint {path}", f"{theirs[:3]} instead of {ours[:3]}")
+    size, ratios = ours[8], [0.0]
     for p, quaternion in ((3, 4), (5, 6)):
-        off = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
-        if off > 0.0:
-            shares.append(off / (_ORIGIN_ROUNDINGS * SINGLE_ROUNDOFF * size) if size else np.inf)
+        distance = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
+        if distance > 0.0:
+            ratios.append(distance / (_ORIGIN_ROUNDINGS * SINGLE_ROUNDOFF * size) if size else np.inf)
         R = rotation_from_quaternion(ours[quaternion]).T @ rotation_from_quaternion(theirs[quaternion])
-        shares.append(_angle(R) / (_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF))
+        ratios.append(_compute_angle(R) / (_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF))
     for a, b in zip(ours[7], theirs[7], strict=True):
-        finite = abs(a) < np.inf
-        if finite and a != b:
-            shares.append(abs(a - b) / (SINGLE_ROUNDOFF * abs(a)) if a else np.inf)
-    if not max(shares) <= 1.0:
-        raise _error(f"{name}, joint {path}", f"{max(shares):.3g} times the bound of single precision")
-    return max(shares)
+        if a != b:
+            ratios.append(abs(a - b) / (SINGLE_ROUNDOFF * abs(a)) if a and np.isfinite(a) else np.inf)
+    if not max(ratios) <= 1.0:
+        raise _make_error(f"{name}, joint {path}", f"{max(ratios):.3g} times the bound of single precision")
+    return max(ratios)
 
 
-def _error(where: str, found: str) -> OracleError:
+def _make_error(where: str, found: str) -> OracleError:
     return OracleError(
         "OpenUSD's parser of UsdPhysics and urdfkin disagree about this joint",
         where=where,
@@ -159,17 +163,14 @@ def _error(where: str, found: str) -> OracleError:
     )
 
 
-def _angle(R: FloatArray) -> float:
-    """Return a rotation's angle, rad.
-
-    Small angles keep full accuracy.
-    """
+def _compute_angle(R: FloatArray) -> float:
+    """Return a rotation's angle, rad. Small angles keep full accuracy."""
     sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
 #: `urdfkin.urdf.usd.Usd.single_rounding_terms` defines the five numbers.
-SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
+SingleRoundingTerms = Mapping[str, tuple[float, float, float, float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +187,9 @@ class SinglePrecisionErrors:
     joints: FloatArray
 
 
-def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> SinglePrecisionErrors:
+def bound_single_precision_errors(
+    tree: KinematicTree, rounding_terms: SingleRoundingTerms
+) -> SinglePrecisionErrors:
     """Bound the errors of rounding to single precision.
 
         error of a stored number <= half the distance to the next number in single precision
@@ -211,7 +214,7 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
         angle error of A B^-1 <= e
         position error of A B^-1 <= w + e |p|
 
-    Entries of `single`:
+    Entries of `rounding_terms`:
 
         revolute joint: e |p| = 0; if p is not zero, B is a separate fixed joint after the revolute joint
             the entry of the revolute joint includes the errors of B; the fixed joint has no entry
@@ -222,18 +225,24 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
     """
     link_errors, joint_errors = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
-        position_error, angle, size, share, lever = single.get(joint.name, (0.0, 0.0, 0.0, 0.0, 0.0))
+        position_error, angle, size, mimic_error, lever = rounding_terms.get(
+            joint.name, (0.0, 0.0, 0.0, 0.0, 0.0)
+        )
         if joint.lock:
             lever = size + joint.length
-        joint_errors[i] = position_error + angle * (0.0 if joint.kind.turns else lever), angle, share
+        joint_errors[i] = position_error + angle * (0.0 if joint.kind.turns else lever), angle, mimic_error
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
         if slides:
             length += largest_value(joint.limit)
         if joint.mimic is not None:
             rule, mimicked_joint = joint.mimic, tree.joints[tree.joint_index(joint.mimic.mimicked_joint)]
-            off = share * (abs(rule.multiplier) * largest_value(mimicked_joint.limit) + abs(rule.offset))
-            position_error, angle = (position_error + off, angle) if slides else (position_error, angle + off)
+            value_error = mimic_error * (
+                abs(rule.multiplier) * largest_value(mimicked_joint.limit) + abs(rule.offset)
+            )
+            position_error, angle = (
+                (position_error + value_error, angle) if slides else (position_error, angle + value_error)
+            )
         parent_position_error, parent_angle_error = link_errors[joint.parent]
         link_errors[i + 1] = (
             parent_position_error + position_error + (parent_angle_error + angle) * length,
@@ -242,8 +251,8 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
     return SinglePrecisionErrors(link_errors, joint_errors)
 
 
-def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare the poses of links and prims.
+def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
+    """Return a sentence about the difference between the poses of links and prims, and at most one remark.
 
     Bounds, with u = `SINGLE_ROUNDOFF` and n joints on the path from the root:
 
@@ -262,6 +271,9 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
             normalizing the rows does not increase this length
             rotation by a small angle t: the nine entries change by a vector of length sqrt(2) t
             angle error <= sqrt(3/2) u
+
+        position error of one operation <= u + angle error, times the diameter of the robot
+        diameter <= twice the largest distance of a prim from the stage's origin
     """
     prims: dict[str, str] = answer["prims"]
     rows = unpack_array(answer["rest"])
@@ -274,22 +286,24 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
     link_errors = bound_single_precision_errors(tree, answer["single"]).links
-    far = float(np.linalg.norm(unpack_array(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
+    max_distance = float(np.linalg.norm(unpack_array(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
     remarks, worst = [], (0.0, 0.0)
-    shares = []
+    ratios = []
     for k, (name, path) in enumerate(prims.items()):
         link = tree.link_index(name)
         depth = len(tree.path(link)) + 1
-        off = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
-        angle = _angle(ours[k, :3, :3].T @ rest[k, :3, :3])
-        turn = link_errors[link, 1] + depth * _TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF
-        length = link_errors[link, 0] + depth * SINGLE_ROUNDOFF * (1.0 + _TRANSFORM_ROUNDINGS) * 2.0 * far
-        share = max(off / length if off else 0.0, angle / turn if angle else 0.0)
-        shares.append(share)
-        worst = max(worst[0], off), max(worst[1], angle)
-        if share > 1.0:
+        distance = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
+        angle = _compute_angle(ours[k, :3, :3].T @ rest[k, :3, :3])
+        angle_bound = link_errors[link, 1] + depth * _TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF
+        distance_bound = (
+            link_errors[link, 0] + depth * SINGLE_ROUNDOFF * (1.0 + _TRANSFORM_ROUNDINGS) * 2.0 * max_distance
+        )
+        ratio = max(distance / distance_bound if distance else 0.0, angle / angle_bound if angle else 0.0)
+        ratios.append(ratio)
+        worst = max(worst[0], distance), max(worst[1], angle)
+        if ratio > 1.0:
             what = (
-                f"the prim's pose and the pose computed from the joints differ by {off:.3g} m"
+                f"the prim's pose and the pose computed from the joints differ by {distance:.3g} m"
                 f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(
@@ -304,14 +318,14 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         else "at q = 0"
     )
     if remarks:
-        words = (
+        line = (
             f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
             f" by up to {worst[0]:.3g} m"
         )
         # An error of one body displaces all later bodies, so only the first difference is reported.
-        return words, tuple(remarks[:1])
+        return line, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"
-        f" ({max(shares, default=0.0):.1%} of the bound)",
+        f" ({max(ratios, default=0.0):.1%} of the bound)",
         (),
     )

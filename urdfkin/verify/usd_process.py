@@ -24,6 +24,9 @@ from urdfkin.urdf.usd import Usd, UsdJoint, import_openusd, read_usd
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.mjcf_process import make_error_answer, pack_array, write_answer
 
+#: A limit of this size means no limit.
+_LARGEST_SINGLE = float(np.finfo(np.float32).max)
+
 
 def serve() -> None:
     request = json.load(sys.stdin)
@@ -39,71 +42,97 @@ def serve() -> None:
 
 
 def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
-    read = read_usd(
+    usd = read_usd(
         request["path"],
         request["name"],
         variants=[tuple(pair) for pair in request["variants"]],
         articulation=request["articulation"],
     )
     return {
-        "urdf": to_urdf(read.tree),
-        "single": read.single_rounding_terms,
-        "remarks": [astuple(one) for one in read.remarks],
-        "prims": read.prims,
-        "rest": pack_array(read.rest_poses[:, :3]),
-        "rest_q": read.rest_q.tolist(),
-        "joints": _read_joints_twice(read),
+        "urdf": to_urdf(usd.tree),
+        "single": usd.single_rounding_terms,
+        "remarks": [astuple(one) for one in usd.remarks],
+        "prims": usd.prims,
+        "rest": pack_array(usd.rest_poses[:, :3]),
+        "rest_q": usd.rest_q.tolist(),
+        "joints": _read_joints_twice(usd),
     }
 
 
-def _read_joints_twice(read: Usd) -> dict[str, Any]:
-    """Read each joint with both readers."""
+def _read_joints_twice(usd: Usd) -> dict[str, Any]:
+    """Return urdfkin's and UsdPhysics's description of each joint, by path; None is a missing joint."""
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        parsed = load(read.stage, ["/"])
+        parsed = load(usd.stage, ["/"])
     for paths, descriptions in parsed.values():
-        for path, one in zip(paths, descriptions, strict=True):
+        for path, description in zip(paths, descriptions, strict=True):
             # A joint with PhysicsArticulationRootAPI has two descriptions in OpenUSD.
             # One describes the joint, and the other describes an articulation and is skipped.
-            if str(path) in read.joints and isinstance(one, physics.JointDesc):
-                found[str(path)] = _describe_joint(physics, one, read)
-    return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
+            if str(path) in usd.joints and isinstance(description, physics.JointDesc):
+                found[str(path)] = _describe_joint(physics, str(path), description, usd)
+    return {path: [ours.as_list(), found.get(path)] for path, ours in usd.joints.items()}
 
 
-def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
+def _describe_joint(physics: Any, path: str, description: Any, usd: Usd) -> list[Any]:
     """Return `UsdJoint.as_list` for OpenUSD's joint."""
     frames = []
     for i in (0, 1):
-        p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")
+        p = getattr(description, f"localPose{i}Position")
+        quaternion = getattr(description, f"localPose{i}Orientation")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
-        frames.append((np.array(p, float) * read.meters_per_unit, xyzw / np.linalg.norm(xyzw)))
-    free = _degrees_of_freedom(physics, one)
-    ends = getattr(one, "limit", None)
-    if isinstance(one, physics.D6JointDesc):
-        own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        # The limits `ends` are None for a joint with several free directions.
-        ends = own.get(free.lower())
-    factor = np.pi / 180.0 if free.startswith("rot") else read.meters_per_unit
-    limits = (
-        (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)
-    )
-    return UsdJoint(free, str(one.body0), str(one.body1), *frames[0], *frames[1], limits, 0.0).as_list()
+        frames.append((np.array(p, float) * usd.meters_per_unit, xyzw / np.linalg.norm(xyzw)))
+    freedoms = _name_degrees_of_freedom(physics, description)
+    factor = np.pi / 180.0 if freedoms.startswith("rot") else usd.meters_per_unit
+    lower, upper = _read_limits(physics, path, description, usd)
+    limits = lower * factor, upper * factor
+    bodies = str(description.body0), str(description.body1)
+    return UsdJoint(freedoms, *bodies, *frames[0], *frames[1], limits, 0.0).as_list()
 
 
-def _degrees_of_freedom(physics: Any, one: Any) -> str:
+def _read_limits(physics: Any, path: str, description: Any, usd: Usd) -> tuple[float, float]:
+    """Return UsdPhysics's limits in degrees or stage units."""
+    names: dict[str, str] = {}
+    if isinstance(description, physics.D6JointDesc):
+        freedom = _name_degrees_of_freedom(physics, description)
+        # A joint with several free directions has no limits.
+        limits = (x.second for x in description.jointLimits if freedom == _name_direction(x.first))
+        limit = next(limits, None)
+    else:
+        limit = getattr(description, "limit", None)
+        names = {"lower": "physics:lowerLimit", "upper": "physics:upperLimit"}
+    if limit is None:
+        return -np.inf, np.inf
+    prim = usd.stage.GetPrimAtPath(path)
+    ends = {"lower": -np.inf, "upper": np.inf}
+    for end in ends:
+        x = float(getattr(limit, end))
+        # UsdPhysics returns 90 and -90 for the blocked limits of revolute and prismatic joints.
+        is_blocked = end in names and prim.GetAttribute(names[end]).Get() is None
+        if not is_blocked:
+            ends[end] = x if abs(x) < _LARGEST_SINGLE else float(np.copysign(np.inf, x))
+    return ends["lower"], ends["upper"]
+
+
+def _name_degrees_of_freedom(physics: Any, description: Any) -> str:
     """Return names such as "transX rotX"."""
     for kind, word in ((physics.RevoluteJointDesc, "rot"), (physics.PrismaticJointDesc, "trans")):
-        if isinstance(one, kind):
-            return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"
-    if isinstance(one, physics.D6JointDesc):
-        ranges = [(str(pair.first).rpartition(".")[2], pair.second) for pair in one.jointLimits]
-        locked = {word[0].lower() + word[1:] for word, ends in ranges if ends.lower > ends.upper}
+        if isinstance(description, kind):
+            return f"{word}{str(description.axis).rpartition('.')[2][-1].upper()}"
+    if isinstance(description, physics.D6JointDesc):
+        limits = [(_name_direction(pair.first), pair.second) for pair in description.jointLimits]
+        locked = {direction for direction, limit in limits if limit.lower > limit.upper}
         return " ".join(
             freedom
             for freedom in ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
             if freedom not in locked
         )
     return ""
+
+
+def _name_direction(axis: Any) -> str:
+    """Return a name such as "transX" for a name such as `JointDOF.TransX`."""
+    word = str(axis).rpartition(".")[2]
+    return word[0].lower() + word[1:]

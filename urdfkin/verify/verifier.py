@@ -38,20 +38,22 @@ from urdfkin.verify.comparison import (
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
 from urdfkin.verify.pinocchio import build_model, pinocchio, version
-from urdfkin.verify.quantities import QUANTITIES, Quantity, replay_line
+from urdfkin.verify.quantities import QUANTITIES, Quantity, format_replay_command
 
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table.
+#: Number of random configurations in the check of a table, besides zero and limit configurations.
 TABLE_SAMPLES = 40
 
-#: True: check all results of a call. "sample": check `SAMPLE` configurations of a call. False: check none.
+#: True: check all results of a call. False: check none.
+#: "sample": check `SAMPLE_SIZE` configurations of a call.
 Verify = bool | Literal["sample"]
 
-SAMPLE = 100
+#: Number of configurations of a call that the policy "sample" checks.
+SAMPLE_SIZE = 100
 
 #: Maximum number of values that are compared at once.
 #: The values then fit into the processor's cache.
@@ -136,21 +138,21 @@ class Verifier:
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
         # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
-        known = self.known_refusal if self.known_refusal not in self._refusals.values() else None
+        known_refusal = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
             tree,
             replace(self.origin, lock=(*self.origin.lock, *lock)),
             policy=self.policy,
             mimic=self.mimic,
-            unverifiable=known,
+            unverifiable=known_refusal,
             oracle=self.library.name,
         )
         verifier.source_notes = self.source_notes
         return verifier
 
     def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
-        """Return why an oracle cannot check the robot."""
+        """Return why an oracle cannot check the robot, or None."""
         if library is PINOCCHIO and self.known_refusal is not None:
             return self.known_refusal
         if library.name not in self._refusals:
@@ -193,7 +195,12 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check and record the results of a call."""
+        """Check and record the results of a call.
+
+        Raises:
+            VerificationError: A result and the oracle's result differ by more than the bound.
+            RangeError: The oracle's result or a bound leaves the range of doubles.
+        """
         ledger, policy = self.ledger, self.resolve_policy(verify)
         if policy is False:
             ledger.count_unchecked(quantity.name, call.result_count)
@@ -202,19 +209,19 @@ class Verifier:
             _warn(reason)
             ledger.count_unchecked(quantity.name, call.result_count, reason)
             return
-        results = call.query.flatten_result(result, quantity.axes)
+        results = call.query.flatten_result(result, quantity.ndim)
         total, worst = BatchComparison(), None
         for part in split_into_parts(policy, call.n, results[:1].size):
-            comparison, failure = self._compare(quantity, call, results[part], part)
+            comparison, failure = self._compare_part(quantity, call, results[part], part)
             if failure is not None and (worst is None or comparison.bound_ratio > total.bound_ratio):
                 worst = failure
             total += comparison
         if worst is not None:
             raise worst
         ledger.count_checked(quantity.name, total)
-        if left := call.result_count - total.result_count:
+        if unchecked := call.result_count - total.result_count:
             ledger.count_unchecked(
-                quantity.name, left, f'verify="sample" checks {SAMPLE} configurations of a call'
+                quantity.name, unchecked, f'verify="sample" checks {SAMPLE_SIZE} configurations of a call'
             )
 
     def make_checked_function(
@@ -259,16 +266,16 @@ class Verifier:
 
         return compute_and_check
 
-    def _compare(
+    def _compare_part(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
         """Compare the configurations `part` of a call with the oracle."""
         x = call.select(part)
-        compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
-        comparison = comparison_with_oracle(*compared)
+        arguments = quantity, self.oracle(call.base, self.library), x, ours, self.library
+        comparison = compare_with_oracle(*arguments)
         if comparison.agrees:
             return comparison, None
-        theirs, bound = compute_oracle_results_with_bound(*compared)
+        theirs, bound = compute_oracle_results_with_bound(*arguments)
         i, f = comparison.index
         k = part.start + i if isinstance(part, slice) else int(part[i])
         bound = Bound(*(np.broadcast_to(x, ours.shape)[i, f] for x in (bound.scale, bound.k)))
@@ -296,7 +303,7 @@ class Verifier:
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.has_reference else None
         if call.base is None and quantity.command:
-            return replay_line(self.origin, quantity.command, frame, reference, values)
+            return format_replay_command(self.origin, quantity.command, frame, reference, values)
         options = call.options if reference is None else {"reference": reference, **call.options}
         words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
         if (query := call.query.select(np.array([k])).base) is not None:
@@ -310,14 +317,17 @@ class Verifier:
         """Check a Denavit-Hartenberg table.
 
         None means that Pinocchio cannot check the robot.
+
+        Raises:
+            TableError: The table and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError, check_table
 
         if (reason := self.find_refusal()) is not None:
             _warn(reason)
             return None
-        drawn = draw_samples(self.tree, samples, np.random.default_rng(0), with_zero_and_limits=True)
-        check = check_table(self.oracle(), self.tree, table, drawn)
+        inputs = draw_samples(self.tree, samples, np.random.default_rng(0), with_zero_and_limits=True)
+        check = check_table(self.oracle(), self.tree, table, inputs)
         if not check.agrees:
             raise TableError(
                 f"the {table.convention} table of {table.base_frame} to {table.tip_frame}"
@@ -334,6 +344,9 @@ class Verifier:
         """Check Khalil-Kleinfinger parameters with Pinocchio.
 
         None means that Pinocchio cannot check the robot.
+
+        Raises:
+            TableError: The parameters and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError
 
@@ -364,7 +377,7 @@ class Verifier:
         return line
 
 
-def comparison_with_oracle(
+def compare_with_oracle(
     quantity: Quantity, oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> BatchComparison:
     if quantity.blocks is None:
@@ -373,7 +386,7 @@ def comparison_with_oracle(
         return compare(ours, theirs, bound, 2)
     bound, units, first = compute_bound(quantity, x, library), np.empty(ours.shape[:2]), 0
     with _ignore_overflow():
-        for theirs in oracle_blocks(quantity, oracle, x.query):
+        for theirs in yield_oracle_blocks(quantity, oracle, x.query):
             part = slice(first, first + len(theirs))
             if part.stop > len(ours):
                 _check_result_count(quantity, library, part.stop, len(ours))
@@ -397,24 +410,24 @@ def compute_oracle_results_with_bound(
 ) -> tuple[FloatArray, Bound]:
     if quantity.results_and_bound is not None:
         return quantity.results_and_bound(oracle, x, ours, library)
-    return oracle_results(quantity, oracle, x.query), compute_bound(quantity, x, library)
+    return compute_oracle_results(quantity, oracle, x.query), compute_bound(quantity, x, library)
 
 
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    With a fixed base and revolute joints, the bound of a placement or a Jacobian is constant.
+    With a fixed base and revolute joints, the bound of a quantity that depends only on q is constant.
     """
     v, a = (*x.rates, None, None)[:2]
-    constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
+    is_constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
     key = "bound", quantity.name, x.reference, library.name
-    bound: Bound | None = x.plan.cache.get(key) if constant else None
+    bound: Bound | None = x.plan.cache.get(key) if is_constant else None
     if bound is None:
-        q = x.q[:1] if constant else x.q
+        q = x.q[:1] if is_constant else x.q
         bound = quantity.bound(
             x.plan, library.adapt_magnitudes(compute_magnitudes(x.plan, q, v, a, x.state)), x.reference
         )
-        if constant:
+        if is_constant:
             x.plan.cache[key] = bound
     return bound
 
@@ -428,11 +441,11 @@ _ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="
 
 
 @_ignore_overflow()
-def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
+def compute_oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
     return quantity.ask_oracle(oracle, query)
 
 
-def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
+def yield_oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
     """Yield an oracle's results in blocks.
 
     Each block may overwrite the previous block.
@@ -453,15 +466,15 @@ def as_verify(verify: object) -> Verify:
     raise InputError('verify must be True, False or "sample"', found=safe_repr(verify))
 
 
-def split_into_parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
+def split_into_parts(verify: Verify, n: int, values_per_configuration: int) -> Iterator[slice | IntArray]:
     """Yield the indices of checked configurations in parts.
 
     With "sample", the configurations are random, because a regular choice may be biased.
-    `numbers` is the number of values for one configuration.
+    `values_per_configuration` is the number of compared numbers for one configuration.
     """
-    step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, numbers)))
-    if verify == "sample" and n > SAMPLE:
-        drawn = np.sort(np.random.default_rng(0).choice(n, SAMPLE, replace=False))
-        yield from (drawn[i : i + step] for i in range(0, SAMPLE, step))
+    step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, values_per_configuration)))
+    if verify == "sample" and n > SAMPLE_SIZE:
+        indices = np.sort(np.random.default_rng(0).choice(n, SAMPLE_SIZE, replace=False))
+        yield from (indices[i : i + step] for i in range(0, SAMPLE_SIZE, step))
     else:
         yield from (slice(i, min(i + step, n)) for i in range(0, n, step))

@@ -66,6 +66,7 @@ class _Canvas:
     """A two-dimensional drawing of points and directions, which are given in the axes of the base.
 
     The first row of `projection` (2, 3) points to the right in the drawing, and the second row points up.
+    `size` (m) is the largest extent of the chain along an axis of the base.
     """
 
     axes: Any

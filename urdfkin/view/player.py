@@ -22,8 +22,8 @@ from urdfkin.view.plot import check_summary
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
-#: Saved motion: frames per second, maximum number of frames minus 1, and size in pixels.
-_FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
+#: Saved motion: frames per second, maximum number of frame intervals, and (width, height) in pixels.
+_FRAME_RATE, _MAX_INTERVALS, _SIZE = 12.5, 250, (640, 480)
 
 
 class Screen(Protocol):
@@ -123,7 +123,7 @@ class Player:
         self.pause()
         shown, t, speed = self.sample, self.trajectory.t, float(self.speed.value)
         seconds = float(t[-1] - t[0]) / speed
-        count = int(np.clip(round(seconds * _FRAME_RATE), 1, _MOST_FRAMES)) + 1
+        count = int(np.clip(round(seconds * _FRAME_RATE), 1, _MAX_INTERVALS)) + 1
         note = client.add_notification("Saving the motion", f"0 of {count} pictures", loading=True)
         frames: list[np.ndarray] = []
         try:
@@ -153,7 +153,10 @@ def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
 
 
 def as_gif(frames: list[np.ndarray], seconds_per_frame: float) -> bytes:
-    """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds_per_frame`."""
+    """Return an endless animation of frames (height, width, 3 or 4).
+
+    The time of each frame is `seconds_per_frame`, rounded to 0.01 s, and at least 0.02 s.
+    """
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
     # Browsers show GIF frames of 1/100 s for too long.

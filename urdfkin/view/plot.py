@@ -106,7 +106,7 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     for k, (quantity, check) in enumerate(x.checks.items()):
         axes.plot(t, check.units, label=quantity, **_line_style(k))
         axes.plot(t, check.bound, linewidth=0.6, **_line_style(k))
-        outside = check.bound_ratio > 1.0
+        outside = ~(check.bound_ratio <= 1.0)
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The plot's vertical axis is logarithmic.
@@ -215,7 +215,7 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE_SIZE = (7.6, 10.4)
 #: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
-#: Letters per inch in the footer and in a legend.
+#: Letters per inch in the footer, and in a legend with the font size 6.
 _LETTERS_PER_INCH, _LEGEND_LETTERS_PER_INCH = 16, 22
 #: Width of the line sample and the gaps in a legend entry. The unit is the width of one letter.
 _HANDLE_LETTERS = 8

@@ -46,7 +46,10 @@ def _load_mesh(file: Path) -> Any:
 
 
 def make_mesh(shape: Shape) -> Any | None:
-    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame; None if unreadable."""
+    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame.
+
+    Return None if the shape has no mesh file, or if the file is unreadable or has no faces.
+    """
     import trimesh
 
     if shape.file is None:
@@ -107,7 +110,7 @@ class Shape:
 
 
 def shapes(robot: Robot) -> list[Shape]:
-    """Return all visuals of a robot, except malformed ones."""
+    """Return all visuals of a robot, except malformed visuals and unknown geometries such as a capsule."""
     root = parse_xml(robot.urdf)  # The URDF of a loaded robot is already checked.
     urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}

@@ -1,4 +1,4 @@
-"""Start viser's web server so that only this user's browser can use it, and open its page.
+"""Start viser's web server, refuse requests without the viewer's key, and open the viewer's page.
 
 A web server on 127.0.0.1 can be reached by every page in the user's browser and by every user of the machine.
 Four independent measures protect the viewer:
@@ -171,7 +171,8 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message that the server accepts from a page: a control has changed.
+#: The only message of a page for which viser's server keeps a handler: a control has changed.
+#: The handlers of the page's own connection remain too, for example for the camera and for pictures.
 _ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
@@ -181,7 +182,7 @@ _NONCE_REPLACEMENTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: Start of the page's head, after which urdfkin's script is added.
+#: Start of the page's head, after which urdfkin's style and script are added.
 _HEAD_START = '<meta charset="utf-8" />'
 _serve_lock = make_fork_safe_lock()
 
@@ -198,7 +199,11 @@ class UnguardedError(UrdfkinError, RuntimeError):
 
 
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Start viser's server with the request filter; `server.address` is the address to open."""
+    """Start viser's server with the request filter; `server.address` is the address to open.
+
+    Raise InputError without viser, or if the server cannot listen on `host`. Raise UnguardedError if the
+    installed viser cannot be secured.
+    """
     try:
         import viser
     except ImportError:
@@ -320,10 +325,10 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 
 
 def _remove_message_handlers(server: Any) -> None:
-    """Remove the handlers with which viser processes messages from a page.
+    """Remove the handlers of viser's server, for example for sharing, uploads and commands.
 
-    The handlers of the messages in `_ACCEPTED_MESSAGES` remain. For example, viser handles a page's messages
-    about sharing, uploads and commands. These handlers are removed.
+    The handlers of the messages in `_ACCEPTED_MESSAGES` remain. Each page's connection has further handlers.
+    They affect only this page's camera, pictures and own controls. urdfkin gives no page its own controls.
     """
     try:
         websocket_server = server._websock_server

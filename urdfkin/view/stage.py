@@ -98,9 +98,11 @@ def _arrows(
 
 
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
-    """Return the ellipsoid of the frame's velocities for joint velocities of length 1.
+    """Return the ellipsoid of the frame's velocities for joint velocities of length 1, scaled for the scene.
 
-    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED.
+    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. `reach` is the
+    robot's size (m). The largest half-length is 0.3 `reach` unless the Jacobian is 0. Each half-length is at
+    least 0.002 `reach`.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -155,9 +157,10 @@ _NORMAL_COLOUR, _OFFSET_COLOUR = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene; `reach` is the robot's size (m).
+    """A robot in viser's scene.
 
-    `missing` lists the meshes that cannot be shown.
+    `reach` (m) is the diagonal of a box around the link origins in the neutral configuration; 1 m if the
+    diagonal is 0. `missing` lists the meshes that cannot be shown.
     """
 
     def __init__(self, server: Any, robot: Robot) -> None:

@@ -41,9 +41,9 @@ from urdfkin.view.stage import (
 #: Joint ranges (rad, m) of at least this size count as unlimited.
 #: Velocity limits (rad/s, m/s) of at least this size count as unlimited too.
 _UNLIMITED_RANGE = 100.0
-#: Step of a slider for an angle or an angle's derivative: _DEGREES if shown in degrees, else _RADIANS.
+#: Step of a slider for an angle or an angle's derivative, if shown in degrees or radians.
 #: An arrow key changes the angle by one step.
-_DEGREES, _RADIANS = 1.0, 0.01
+_STEP_DEGREES, _STEP_RADIANS = 1.0, 0.01
 #: Minimum number of steps of a slider in m, m/s or m/s^2.
 #: The slider's step is 1, 2 or 5 times a power of ten.
 _MIN_STEPS = 50.0
@@ -150,7 +150,7 @@ class Sliders:
 
     def _step(self, row: SliderRow, width: float) -> float:
         if row.is_angle:
-            return _DEGREES if self._degrees else _RADIANS
+            return _STEP_DEGREES if self._degrees else _STEP_RADIANS
         size = width / _MIN_STEPS
         power = 10.0 ** math.floor(math.log10(size))
         return next(power * digit for digit in (5.0, 2.0, 1.0) if power * digit <= size * (1.0 + 1e-9))

@@ -160,6 +160,15 @@ def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
             assert np.array_equal(together[:, k], method(*inputs, frame))
 
 
+def test_an_output_array_does_not_change_the_result(dog: Robot) -> None:
+    other = dog.with_convention("drake")
+    q, v, _ = other.conversion.to(*_values(dog))
+    for method, inputs in ((other.jacobian, (q,)), (other.jacobian_rate, (q, v)), (other.hessian, (q,))):
+        expected = method(*inputs, "trunk")
+        out = np.empty((*expected.shape[:-1], dog.nv))
+        assert np.array_equal(method(*inputs, "trunk", out=out), expected)
+
+
 def test_equal_conventions_make_no_copy() -> None:
     ur5 = urdfkin.load("ur5", verify=False)
     q = ur5.sample(10)

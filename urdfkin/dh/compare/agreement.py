@@ -49,8 +49,8 @@ _MAX_CELLS_ERROR_FRACTION = 0.5
 #: Accepted after the correction: tip error <= max(tolerance, this number * tip error before)
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: The cells that differ without a fit are reported only if their number is at most
-#: this number + the number of cells that are reported after a fit.
+#: The cells that differ without a fit are reported only if:
+#: their number <= number of cells that are reported after a fit + this number
 _MAX_MORE_UNFITTED_CELLS = 2
 #: The reach is computed from the positions of the tip.
 #: If the tip moves at most this fraction of the path length, the path length replaces the reach.
@@ -163,7 +163,6 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
 
 
 def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Sample poses for fit and check."""
     values, poses = _sample_poses(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(
@@ -172,10 +171,7 @@ def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return joint values and tip poses.
-
-    Mimic joints move independently.
-    """
+    """Mimic joints move independently."""
     travels = _prismatic_ranges(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = sample_uniform(ranges, count, seed)
@@ -215,11 +211,7 @@ def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Mark cells that the reference contains.
-
-    Returns:
-        (n, 5) ones and zeros.
-    """
+    """Return (n, 5): 1 for a cell that the reference contains, otherwise 0."""
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
@@ -232,7 +224,7 @@ def _find_compensated_cells(
     """Find the cells whose errors a fit hides.
 
     Returns:
-        Row index and name.
+        Row index and name of each cell.
     """
     compensated = []
     for i, k in find_compensated_cells(fitted, check_targets):

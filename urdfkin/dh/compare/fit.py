@@ -123,7 +123,7 @@ class TableArrays:
 
     @cached_property
     def variable_indices(self) -> tuple[int, ...]:
-        """Cell index of each joint's variable."""
+        """Column index in `CELLS` of each joint's variable."""
         return tuple(CELLS.index("theta" if turns else "d") for turns in self.turns)
 
     @property
@@ -306,10 +306,10 @@ def _orthonormal_basis(columns: FloatArray) -> FloatArray:
 
 
 def find_compensated_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Find cells equivalent to free parameters.
+    """Find the cells with the same effect on the tip as a change of free parameters.
 
     Returns:
-        Row and cell index.
+        Row index and column index of each cell.
     """
     _, free_derivatives, cell_derivatives = tip_poses_and_derivatives(model, targets)
     Q = _orthonormal_basis(free_derivatives)
@@ -331,7 +331,7 @@ def fit_model(
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters.
+    """Fit the free parameters and the joint signs.
 
     The fit tries no further joint signs if metres + reach * radians <= `target_error` (m).
     """

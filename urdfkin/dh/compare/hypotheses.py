@@ -36,7 +36,7 @@ _PARALLEL_TILT = 2e-2
 #: Cost (metres) of each difference from the interpretation that the file states:
 #: cost = _DIFFERENCE_COST_RATIO * min(D) + tolerance
 #: D: sum of |shape of the table - shape of the URDF|
-#: The minimum is over all interpretations.
+#: The minimum is over all other interpretations with the URDF's joint kinds.
 _DIFFERENCE_COST_RATIO = 0.1
 #: A tip error within the tolerance is accepted, and ends the search for a better interpretation.
 #: Above the tolerance, the tip error must be at most this fraction of the reach,
@@ -44,7 +44,8 @@ _DIFFERENCE_COST_RATIO = 0.1
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: `find_better_interpretation` ignores these keys of a table, because the function fits base and tool.
+#: `find_better_interpretation` ignores these keys of a table.
+#: The function fits base and tool, and `coordinates` has an effect only with mimic rules.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3

@@ -1,4 +1,4 @@
-"""Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
+"""Find a single mistake in a table: a wrong sign, an alpha wrong by a right angle, or a wrong order of rows.
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. If the
 cell is corrected first, the fit changes fewer parameters.
@@ -38,11 +38,7 @@ _MAX_FITTED_CORRECTIONS = 100
 
 @dataclass(frozen=True, slots=True)
 class _TableCorrection:
-    """A table with one correction.
-
-    Attributes:
-        cell: None if rows are reordered.
-    """
+    """`cell` is None if the order of rows is corrected."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -97,10 +93,7 @@ class MistakeSearch:
         return ()
 
     def _agrees_after_one_fit_change(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of one parameter.
-
-        The parameter is base, tool, a joint offset or a joint sign.
-        """
+        """One change: the base, the tool, a joint offset or a joint sign."""
         if self._fit_one_end(table) is not None:
             return True
         model = self._fit_zeros_and_senses(table)

@@ -40,6 +40,7 @@ class CellDifference:
     Values are in m or rad.
 
     Attributes:
+        row: Index of the row, from 0.
         tip_displacement: Largest displacement (m) of the tip by the correction of this cell, on samples.
         half_digit: Half a unit of the last digit of `reference`.
             0 if the value is exact or the cell's text is unknown.
@@ -114,9 +115,11 @@ class Mistake:
     """A likely mistake in a table.
 
     Attributes:
+        rows: Indices of the wrong rows, from 0.
+        cell: The wrong cell; None if the order of rows is wrong.
         table: The corrected table.
-        fit_changes: Fit of this table.
-        metres, radians: Tip errors after this fit.
+        fit_changes: Fit of the corrected table.
+        metres, radians: Largest tip errors after this fit, on samples.
     """
 
     kind: MistakeKind
@@ -187,7 +190,7 @@ class TableComparison:
     def rounding_error(self) -> float:
         """Largest tip error due to rounding.
 
-        Unit: rad, or m per m of reach.
+        Unit: rad, or m per m of reach and travel.
         """
         return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
@@ -200,7 +203,7 @@ class TableComparison:
     def resolution(self) -> float:
         """Rounding step of fitted numbers.
 
-        The unit is that of `rounding_error`.
+        Unit: rad, or m per m of reach.
         """
         return fit_resolution(self.metres / self.reach, self.radians)
 
@@ -208,7 +211,7 @@ class TableComparison:
     def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        The proof covers the joint values of `metres_bound`.
+        The proof covers the same joint values as `metres_bound`.
         """
         return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 

@@ -39,6 +39,9 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
     """Export a table in a format of `FORMATS`.
 
     Only printed tables use `units`. With `verify`, Pinocchio checks numeric code.
+
+    Raises:
+        UnknownNameError: the format does not exist.
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)

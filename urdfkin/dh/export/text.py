@@ -1,7 +1,7 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, the cells, base and tool. `measure_printed_table` computes
-the tip error due to the rounding of the printed numbers.
+All formats contain the convention, the formula, the cells, base and tool. LaTeX omits a base or a tool that
+is the identity. `measure_printed_table` computes the tip error due to the rounding of the printed numbers.
 """
 
 from __future__ import annotations
@@ -255,7 +255,7 @@ class PrintedPrecision:
 
     Attributes:
         metres: Largest position error on the samples.
-        bound: Proven bound within the joint limits, m.
+        bound: Proven bound within the joint limits, m; None if no finite bound is known.
         condition: Condition on the joint values under which the bound holds, or "".
     """
 

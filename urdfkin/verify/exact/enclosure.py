@@ -35,12 +35,12 @@ from urdfkin.verify.quantities import (
     VELOCITY,
     Quantity,
 )
-from urdfkin.verify.verifier import Verifier, compute_own_results, oracle_results
+from urdfkin.verify.verifier import Verifier, compute_oracle_results, compute_own_results
 
 #: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
 MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
-_ENDS = np.vectorize(interval_ends, otypes=[float, float])
+_round_ends = np.vectorize(interval_ends, otypes=[float, float])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -167,13 +167,19 @@ def enclose(
             *(batch[0] for batch in part.query.inputs),
             base=None if base is None else make_base_state(base),
         )
-        rows = (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN, JACOBIAN_RATE, *([HESSIAN] if hessian else []))
-        bounds = [(row, *_ENDS(row.enclose(motion, link, call.reference))) for row in rows]
+        quantities = [PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN, JACOBIAN_RATE]
+        quantities += [HESSIAN] if hessian else []
+        bounds = [
+            (quantity, *_round_ends(quantity.enclose(motion, link, call.reference)))
+            for quantity in quantities
+        ]
     oracle = None if verifier.find_refusal(base) else verifier.oracle(base)
 
-    def make_enclosure(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
-        ours = freeze(compute_own_results(row, part)[0, 0])
-        theirs = None if oracle is None else freeze(oracle_results(row, oracle, part.query)[0, 0])
-        return Enclosure(row.name, freeze(lower), freeze(upper), ours, theirs)
+    def make_enclosure(quantity: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
+        ours = freeze(compute_own_results(quantity, part)[0, 0])
+        theirs = (
+            None if oracle is None else freeze(compute_oracle_results(quantity, oracle, part.query)[0, 0])
+        )
+        return Enclosure(quantity.name, freeze(lower), freeze(upper), ours, theirs)
 
-    return Enclosures(frame, call.reference, digits, *(make_enclosure(*found) for found in bounds))
+    return Enclosures(frame, call.reference, digits, *(make_enclosure(*row) for row in bounds))

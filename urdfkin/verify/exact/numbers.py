@@ -30,9 +30,9 @@ from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Least number of decimal digits in the accuracy study.
+#: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
-DIGITS = 50
+REFERENCE_DIGITS = 50
 #: Number of decimal digits for a path without joints: twice the 15 decimal digits of a double.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
@@ -45,21 +45,20 @@ _ADDITIONAL_BITS = 5
 _SIGNIFICANT_DIGITS = 17
 #: Number of digits of intermediate results in `format_decimal`.
 #: `format_decimal` then rounds the decimal to 17 digits.
-_CONVERSION_DIGITS = 200
+_INTERMEDIATE_DIGITS = 200
 #: Additional bits of precision for the Newton steps of `nearest_rotation`.
 _NEWTON_BITS = 30
 
 _precision_lock = make_fork_safe_lock()
 
 
-def enough_digits(joints: int) -> int:
-    """Return the number of decimal digits for intervals on a path with `joints` joints.
+def enough_digits(joint_count: int) -> int:
+    """Return the number of decimal digits for intervals on a path with `joint_count` joints.
 
-    With this number, an interval is narrower than the last digit of a double.
-    One more digit makes an interval ten times narrower.
-    A joint with an oblique axis makes an interval about twice as wide.
+    With this number, an interval is narrower than the last digit of a double: one more digit makes an
+    interval ten times narrower, and a joint with an oblique axis makes an interval about twice as wide.
     """
-    return _BASE_DIGITS + joints
+    return _BASE_DIGITS + joint_count
 
 
 @contextmanager
@@ -90,10 +89,9 @@ def interval_ends(x: Number) -> tuple[float, float]:
 
 
 def _round_outward(end: arb, towards: float) -> float:
-    """Round an exact number in the direction `towards`."""
-    found = float(end)
-    inside = arb(found) > end if towards < 0.0 else arb(found) < end
-    return math.nextafter(found, towards) if inside else found
+    rounded = float(end)
+    is_inside = arb(rounded) > end if towards < 0.0 else arb(rounded) < end
+    return math.nextafter(rounded, towards) if is_inside else rounded
 
 
 def format_decimal(x: Number, negligible: float) -> str | None:
@@ -115,7 +113,7 @@ def format_decimal(x: Number, negligible: float) -> str | None:
     if not radius <= abs(middle) * 1e-20:
         return None
     digits, power = middle.man_exp()
-    with localcontext(prec=_CONVERSION_DIGITS):
+    with localcontext(prec=_INTERMEDIATE_DIGITS):
         number = int(digits) * Decimal(2) ** int(power)
     with localcontext(prec=_SIGNIFICANT_DIGITS, rounding=ROUND_HALF_EVEN):
         rounded = (+number).normalize()
@@ -180,15 +178,15 @@ def nearest_rotation(M: Matrix) -> Matrix:
     """
     with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
-            steps = eq.product(M, _orthogonality_defect(M))
+            steps = eq.product(M, _compute_gram_residual(M))
             x, y, z = (eq.minus(row, eq.times(0.5, step)) for row, step in zip(M, steps, strict=True))
             M = x, y, z
-        bound = arb(0, sum(abs(number) for row in _orthogonality_defect(M) for number in row).upper())
+        bound = arb(0, sum(abs(number) for row in _compute_gram_residual(M) for number in row).upper())
         x, y, z = ((a + bound, b + bound, c + bound) for a, b, c in M)
     return x, y, z
 
 
-def _orthogonality_defect(M: Matrix) -> Matrix:
+def _compute_gram_residual(M: Matrix) -> Matrix:
     """Return M^T M - I."""
     gram = eq.product(eq.transposed(M), M)
     x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
@@ -226,7 +224,7 @@ def read_exact_joints(
     """Read the exact numbers of joints."""
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if joint_indices is None else joint_indices
-    return {i: exact_text.find_joint(tree.joints[i], tree.name) for i in indices}
+    return {i: exact_text.read_joint(tree.joints[i], tree.name) for i in indices}
 
 
 def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
@@ -241,17 +239,19 @@ class _ExactText:
         self.kind = kind
         root = parse_xml(text)
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
-        self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _FIRST_QUATERNION_VERSION
+        self.reads_quaternions = (
+            tuple(map(int, root.get("version", "1.0").split("."))) >= _FIRST_QUATERNION_VERSION
+        )
 
-    def find_joint(self, joint: Joint, robot: str) -> ExactJoint:
+    def read_joint(self, joint: Joint, robot_name: str) -> ExactJoint:
         if joint.lock is not None:
-            return self.apply_lock(self.find_joint(joint.lock.joint, robot), joint.lock)
+            return self.apply_lock(self.read_joint(joint.lock.joint, robot_name), joint.lock)
         element = self.elements.get(joint.name)
         if element is not None:
             return self.parse_joint(element, has_axis=joint.kind.has_axis, is_mimic=joint.mimic is not None)
         if joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
             return ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
-        raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
+        raise InputError("a joint is not in the URDF text", where=robot_name, found=joint.name)
 
     def apply_lock(self, free: ExactJoint, lock: Lock) -> ExactJoint:
         R, p = free.R, free.p
@@ -274,15 +274,15 @@ class _ExactText:
         )
 
     def parse_numbers(self, element: Element | None, name: str, default: str) -> tuple[Number, ...]:
-        written = default if element is None else element.get(name, default)
-        return tuple(map(self.kind.number, written.split()))
+        text = default if element is None else element.get(name, default)
+        return tuple(map(self.kind.number, text.split()))
 
     def parse_vector(self, element: Element | None, name: str, default: str) -> Vector:
         x, y, z = self.parse_numbers(element, name, default)
         return x, y, z
 
     def has_quaternion(self, origin: Element | None) -> bool:
-        return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
+        return self.reads_quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
     def parse_rotation(self, origin: Element | None) -> Matrix:
         if origin is not None and self.has_quaternion(origin):
@@ -303,10 +303,12 @@ class _ExactText:
         return multiplier, offset
 
     def conversion_errors(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-        at: dict[str, Any] = {
+        values: dict[str, Any] = {
             joint.name: q[:, i] for joint, i in zip(tree.joints, tree.q_index, strict=True) if joint.nq == 1
         }
-        at |= {joint.name: joint.lock.q for joint in tree.joints if joint.lock and not joint.lock.joint.mimic}
+        values |= {
+            joint.name: joint.lock.q for joint in tree.joints if joint.lock and not joint.lock.joint.mimic
+        }
         angles, rules, lengths, step = np.zeros(len(q)), 0, [0.0], 0
         for i in path:
             joint, unlocked = tree.joints[i], tree.joints[i].original
@@ -315,7 +317,7 @@ class _ExactText:
                 if not self.has_quaternion(origin):
                     angles += math.fsum(abs(float(x)) for x in self.parse_numbers(origin, "rpy", "0")) / 2.0
                 if unlocked.mimic is not None:
-                    value = self.bound_value(joint.name, at)
+                    value = self.bound_value(joint.name, values)
                     rules += value.rule_count
                     if unlocked.kind.turns:
                         angles += value.error + 0.5 * (value.rule_count - 1) * (
@@ -332,16 +334,16 @@ class _ExactText:
                 step += 1
         return DecimalErrors(angles, rules, np.array(lengths))
 
-    def bound_value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
+    def bound_value(self, name: str, values: Mapping[str, Any]) -> _ValueBound:
         """Bound a joint's value and rounding error.
 
-        `at` contains the values of the independent joints.
+        `values` contains the values of the independent joints.
         """
         rule = self.elements[name].find("mimic")
-        if rule is None or name in at:
-            return _ValueBound(abs(at[name]), 0.0, 0.0, 0)
+        if rule is None or name in values:
+            return _ValueBound(abs(values[name]), 0.0, 0.0, 0)
         m, c = abs(float(rule.get("multiplier", "1"))), abs(float(rule.get("offset", "0")))
-        x = self.bound_value(str(rule.get("joint")), at)
+        x = self.bound_value(str(rule.get("joint")), values)
         error = m * x.error + 1.5 * m * (x.scaled_coordinate + x.offset) + c
         return _ValueBound(m * x.scaled_coordinate, m * x.offset + c, error, x.rule_count + 1)
 

@@ -32,21 +32,19 @@ _RECURSION = Recursion(equations)
 #: Axis of each velocity of a planar or floating joint.
 #: First entry: 0, 1 or 2 for the x-, y- or z-axis of the child link.
 #: Second entry: True for an angular velocity.
-_FREE_AXES = {
+_VELOCITY_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
 }
 
 
 def make_base_state(base: BaseMotionLike) -> LinkState:
-    """Return the base's motion as a link state."""
-
-    def vector(x: FloatArray) -> Vector:
+    def as_interval_vector(x: FloatArray) -> Vector:
         return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
 
     T, six, six_2 = base.placement, base.velocity, base.acceleration
-    R = nearest_rotation((vector(T[0]), vector(T[1]), vector(T[2])))
-    return LinkState(R, *map(vector, (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])))
+    R = nearest_rotation((as_interval_vector(T[0]), as_interval_vector(T[1]), as_interval_vector(T[2])))
+    return LinkState(R, *map(as_interval_vector, (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,38 +73,38 @@ def compute_motion(
     states = {0: base or LinkState()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
     for i, exact_joint in joints.items():
-        joint, at, rate_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
+        joint, q_at, v_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
         placed = _RECURSION.rotate_frame(
             _RECURSION.translate_frame(states[joint.parent], exact_joint.p), exact_joint.R
         )
-        kind, new = joint.kind, tuple[Column, ...]()
+        kind, new_columns = joint.kind, tuple[Column, ...]()
         if kind.has_axis:
             axis, multiplier = exact_joint.axis, exact_joint.multiplier
-            coordinate = multiplier * q[at] + exact_joint.offset
-            rates = multiplier * v[rate_at], multiplier * a[rate_at]
+            coordinate = multiplier * q[q_at] + exact_joint.offset
+            rates = multiplier * v[v_at], multiplier * a[v_at]
             z = _RECURSION.express(placed, axis)
             if kind.turns:
                 moved = _RECURSION.after_revolute(placed, axis, rotation_about(axis, coordinate), *rates)
             else:
                 moved = _RECURSION.after_prismatic(placed, axis, coordinate, *rates)
-            new = (Column(z, kind.turns, moved, i, rate_at, multiplier),)
+            new_columns = (Column(z, kind.turns, moved, i, v_at, multiplier),)
         elif kind is JointKind.FIXED:
             moved = placed
         elif kind is JointKind.PLANAR:
-            S = rotation_about(IDENTITY[2], q[at + 2])
-            moved = _RECURSION.after_planar(placed, q[at:], S, v[rate_at:], a[rate_at:])
+            S = rotation_about(IDENTITY[2], q[q_at + 2])
+            moved = _RECURSION.after_planar(placed, q[q_at:], S, v[v_at:], a[v_at:])
         elif kind is JointKind.FLOATING:
-            S = rotation_from_quaternion(q[at + 3 : at + 7])
-            moved = _RECURSION.after_floating(placed, q[at:], S, v[rate_at:], a[rate_at:])
+            S = rotation_from_quaternion(q[q_at + 3 : q_at + 7])
+            moved = _RECURSION.after_floating(placed, q[q_at:], S, v[v_at:], a[v_at:])
         else:
             raise NotImplementedError(f"the motion of a {kind} joint")
-        if kind in _FREE_AXES:
+        if kind in _VELOCITY_AXES:
             axes = equations.transposed(moved.R)
-            new = tuple(
-                Column(axes[k], turns, moved, i, rate_at + c, 1)
-                for c, (k, turns) in enumerate(_FREE_AXES[kind])
+            new_columns = tuple(
+                Column(axes[k], turns, moved, i, v_at + c, 1)
+                for c, (k, turns) in enumerate(_VELOCITY_AXES[kind])
             )
-        states[i + 1], columns[i + 1] = moved, (*columns[joint.parent], *new)
+        states[i + 1], columns[i + 1] = moved, (*columns[joint.parent], *new_columns)
     return ExactMotion(states, columns, tree.nv)
 
 
