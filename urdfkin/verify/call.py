@@ -69,8 +69,8 @@ class Call:
             raise InputError("base must be a BaseMotion or None", found=type(base).__name__)
         named = [as_text_or_mapping(x, name) for x, name in zip(q_v_a, "qva", strict=False)]
         inputs: list[ArrayLike] = [
-            cast("ArrayLike", x) if by is None else parse_numbers(tree, by, name)
-            for x, by, name in zip(q_v_a, named, "qva", strict=False)
+            cast("ArrayLike", x) if by_name is None else parse_numbers(tree, by_name, name)
+            for x, by_name, name in zip(q_v_a, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
         self.is_list, self.frames = _parse_frames(frame)

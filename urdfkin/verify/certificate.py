@@ -318,8 +318,8 @@ class Ledger:
     def certificate(self, robot: str, oracle: str) -> Certificate:
         with _ledger_lock:
             accounts = {name: self._accounts[name] for name in QUANTITIES if name in self._accounts}
-            off = any(account.count_disabled_checks() for account in accounts.values())
-            reasons = (*([CHECK_DISABLED] if off else []), *self._reasons)
+            has_disabled_checks = any(account.count_disabled_checks() for account in accounts.values())
+            reasons = (*([CHECK_DISABLED] if has_disabled_checks else []), *self._reasons)
             lines = [account.line(name) for name, account in accounts.items()]
             return Certificate(
                 robot, oracle, tuple(line for line in lines if line.checked or line.unchecked), reasons

@@ -101,23 +101,23 @@ def worst_disagreements(
     """
     leading, own = ours.shape[:leading_axes], ours.shape[leading_axes:]
     n, width = math.prod(leading), math.prod(own)
-    shared = leading_axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
-    shape = (1, *ours.shape[1:]) if shared else ours.shape
-    one, other = _as_rows(ours, ours.shape, n, width), _as_rows(theirs, ours.shape, n, width)
-    size = _as_rows(scale, shape, math.prod(shape[:leading_axes]), width)
+    is_scale_shared = leading_axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
+    shape = (1, *ours.shape[1:]) if is_scale_shared else ours.shape
+    our_rows, their_rows = _as_rows(ours, ours.shape, n, width), _as_rows(theirs, ours.shape, n, width)
+    scale_rows = _as_rows(scale, shape, math.prod(shape[:leading_axes]), width)
     if (kernel := preload.get_kernel("worst", module=VERIFY_KERNELS_MODULE)) is None:
         begin = time.thread_time()
-        scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
-        worst: FloatArray = disagreement(one, other, scale_of_each).max(axis=1, initial=0.0)
+        scale_of_each = scale_rows if len(scale_rows) == n else scale_rows[np.arange(n) % len(scale_rows)]
+        worst: FloatArray = disagreement(our_rows, their_rows, scale_of_each).max(axis=1, initial=0.0)
         preload.add_time("worst", time.thread_time() - begin)
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If `size` has fewer than n rows, the kernel uses these arrays as working memory.
-        if len(size) < n:
-            unit, units, out_bits = np.empty(size.size), np.zeros(width), worst.view(np.int64)
+        # If `scale_rows` has fewer than n rows, the kernel uses these arrays as working memory.
+        if len(scale_rows) < n:
+            unit, units, out_bits = np.empty(scale_rows.size), np.zeros(width), worst.view(np.int64)
             bits = units.view(np.int64)
-        kernel(one, other, size, worst, out_bits, unit, units, bits)
+        kernel(our_rows, their_rows, scale_rows, worst, out_bits, unit, units, bits)
     return worst.reshape(leading)
 
 

@@ -126,27 +126,27 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
       used only if the rows repeat
     - `out_bits`, `bits`: views of `out` and `units` as integers
     """
-    known = in_triples = len(scale) < len(out)
+    is_known_finite = has_triples = len(scale) < len(out)
     for k in range(len(scale)):
-        known = known and _is_finite(scale, k)
-        in_triples = in_triples and _has_equal_triples(scale, k)
-    in_triples = in_triples and known
+        is_known_finite = is_known_finite and _is_finite(scale, k)
+        has_triples = has_triples and _has_equal_triples(scale, k)
+    has_triples = has_triples and is_known_finite
     width, address = ours.shape[1] // 6, doubles_at(ours.ctypes.data)
     numbers = 6 * width
-    if in_triples:
+    if has_triples:
         for k in range(len(scale)):
             for j in range(numbers):
                 size = scale[k, j]
                 unit[k * numbers + j] = max(EPS * size, SMALLEST_SUBNORMAL) if size > 0.0 else 0.0
     for i in range(len(out)):
         k = i % len(scale)
-        if in_triples:
+        if has_triples:
             prefetch(address, min(i + _PREFETCH_DISTANCE, len(out) - 1) * numbers, numbers)
             for first in (0, 3 * width):
                 rows, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
                 _divide_triples(ours[i, rows], theirs[i, rows], of_scale, width, units[first // 3 :])
             out_bits[i] = min(_largest_bits(bits, 2 * width), _INFINITY_BITS)
-        elif not (_is_difference_finite(ours, theirs, i) and (known or _is_finite(scale, k))):
+        elif not (_is_difference_finite(ours, theirs, i) and (is_known_finite or _is_finite(scale, k))):
             out[i] = math.inf
         else:
             out[i] = _largest_difference(ours, theirs, scale, i, k)

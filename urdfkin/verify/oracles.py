@@ -66,9 +66,9 @@ def _restore_library(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    wanted = as_str(name, "oracle")
-    if (oracle := ORACLES.get(wanted)) is None:
-        raise UnknownNameError("oracle", wanted, ORACLES)
+    library_name = as_str(name, "oracle")
+    if (oracle := ORACLES.get(library_name)) is None:
+        raise UnknownNameError("oracle", library_name, ORACLES)
     if oracle is not PINOCCHIO:
         oracle.version()  # `version` raises an error if the library is missing.
     return oracle
