@@ -31,7 +31,7 @@ from scripts.benchmarking.tables import format_machine, make_tables
 from scripts.benchmarking.timing import DifferenceError, Row
 from scripts.benchmarking.workload import QUANTITIES, ROBOT_FRAMES
 from urdfkin.compiled.preload import use_only
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import package_versions
 
 SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints", "frames", "sizes", "memory")
 
@@ -65,7 +65,7 @@ def measure_sections(
     }
     figures: dict[str, Any] = {
         "machine": describe_machine(),
-        "versions": versions(),
+        "versions": package_versions(),
         "libraries": {contender.library: contender.version for contender in contenders},
         "rounds": rounds,
         "operations": dict(measured.operation_counts()),

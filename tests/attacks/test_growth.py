@@ -27,7 +27,7 @@ from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, MAX_ERRORS_PER_CODE, Re
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check_text
 from urdfkin.urdf.lint.formats import as_json
 from urdfkin.urdf.parser import read_document
-from urdfkin.verify.oracle import rules_of_text
+from urdfkin.verify.oracle import parse_mimic_rules
 
 #: For four times the size: largest accepted ratio of times, between 4 (linear) and 16 (quadratic), and
 #: additional seconds for a busy machine. Then the largest time of a test, s.
@@ -94,7 +94,9 @@ def test_a_chain_of_mimic_joints_is_read_in_linear_time_by_both_readers() -> Non
     def read(size: int) -> None:
         tree = tree_of(documents[size])
         names = {joint.name for joint in tree.joints}
-        assert rules_of_text(documents[size].decode(), names)[tree.joints[-1].name] == tree.joints[-1].mimic
+        assert (
+            parse_mimic_rules(documents[size].decode(), names)[tree.joints[-1].name] == tree.joints[-1].mimic
+        )
 
     grows_like_its_size(read, 100_000)
 

@@ -21,8 +21,8 @@ CHANGES = [
      "M - M @ (0.5 * defect)", "np.swapaxes(M - M @ (0.5 * defect), -1, -2)"),
     ("kinematics.rotation.nearest_rotation", "M - M @ (0.5 * defect)", "M + M @ (0.5 * defect)"),
     # a call's inputs and its results
-    ("verify.call.Call._flat_input", "array.reshape(self.n, width)", "array.reshape(self.n, width)[::-1]"),
-    ("verify.call.Call._flat_input",
+    ("verify.call.Call._flatten_input", "array.reshape(self.n, width)", "array.reshape(self.n, width)[::-1]"),
+    ("verify.call.Call._flatten_input",
      "np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width)",
      "np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width)[::-1]"),
     ("verify.call.Call.__init__",
@@ -89,11 +89,11 @@ CHANGES = [
     ("verify.oracle.PinocchioLayout.__init__", "at[rule.mimicked_joint]", "at[rule.mimicked_joint][::-1]"),
     ("verify.oracle.Frames.find_index", "self._bodies.get(name)", "self._bodies.get(name[5:])"),
     ("verify.oracle.OracleQuery.select.pick",
-     "spread[np.unravel_index(numbers, self.shape)]",
-     "spread[np.unravel_index(numbers, self.shape)][::-1]"),
+     "broadcast_x[np.unravel_index(indices, self.shape)]",
+     "broadcast_x[np.unravel_index(indices, self.shape)][::-1]"),
     ("verify.oracle.OracleQuery.flatten_result",
-     "result.reshape(self.n, len(self.frames), *own)",
-     "result.reshape(self.n, len(self.frames), *own)[::-1]"),
+     "result.reshape(self.n, len(self.frames), *own_shape)",
+     "result.reshape(self.n, len(self.frames), *own_shape)[::-1]"),
 ]  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from urdfkin.urdf.sources import Origin
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION
 from urdfkin.validation.robot_summary import describe
-from urdfkin.verify.oracle import QueryBatch, rules_of_text
+from urdfkin.verify.oracle import QueryBatch, parse_mimic_rules
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 
@@ -119,7 +119,7 @@ numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st.DataObject, n: int) -> None:
     rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]
     text = mimic_chain(rules)
-    theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
+    theirs = parse_mimic_rules(text, {f"j{i}" for i in range(n + 1)})
     ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
     assert theirs == ours  # the same doubles
     angles = [0.7]  # apply the rules one after the other

@@ -22,6 +22,9 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 from urdfkin.robot.loading import load
 from urdfkin.urdf import writer
 from urdfkin.validation.campaign import validate
+from urdfkin.verify.conversions import check_table_source
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.tables import TableError
 
 conventions = st.sampled_from(CONVENTIONS)
@@ -188,6 +191,23 @@ def test_a_urdf_that_differs_from_the_table_is_refused(monkeypatch: pytest.Monke
     with pytest.raises(TableError, match="the URDF made from a table differs from the table"):
         load(table)
     assert load(table, verify=False).nq == 6
+
+
+def test_a_nan_in_pinocchios_placement_is_a_difference_from_the_table(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table, placements = read_table(UR5), PinocchioOracle.placements
+    verifier = load(table, verify=False).verifier
+
+    def with_nan(self: PinocchioOracle, x: QueryBatch) -> FloatArray:
+        T = placements(self, x)
+        T[0, 0, 0, 0] = np.nan
+        return T
+
+    check_table_source(verifier, table)
+    monkeypatch.setattr(PinocchioOracle, "placements", with_nan)
+    with pytest.raises(TableError, match="the URDF made from a table differs from the table"):
+        check_table_source(verifier, table)
 
 
 def test_a_table_takes_no_xacro_arguments() -> None:

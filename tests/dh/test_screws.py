@@ -22,6 +22,8 @@ from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot.loading import load
 from urdfkin.verify.conversions import check_screws
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.tables import TableError
 
 #: Lynch and Park, Modern Robotics, example 4.5: a UR5 with W1 = 109 mm, W2 = 82, L1 = 425, L2 = 392, H1 = 89,
@@ -84,6 +86,20 @@ def test_a_wrong_screw_is_detected_by_pinocchio() -> None:
     wrong[2, 5] += 1e-12
     with pytest.raises(TableError, match="product of exponentials disagrees"):
         check_screws(robot.verifier, replace(screws, space=wrong))
+
+
+def test_a_nan_in_pinocchios_rotation_is_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = load("ur5")
+    screws, placements = robot.screws(), PinocchioOracle.placements
+
+    def with_nan(self: PinocchioOracle, x: QueryBatch) -> FloatArray:
+        T = placements(self, x)
+        T[:, 1, 0, 0] = np.nan
+        return T
+
+    monkeypatch.setattr(PinocchioOracle, "placements", with_nan)
+    with pytest.raises(TableError, match="product of exponentials disagrees"):
+        check_screws(robot.verifier, screws)
 
 
 @pytest.mark.parametrize("form", ["toml", "json"])

@@ -16,7 +16,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.oracle import free_flyer
+from urdfkin.verify.oracle import free_flyer_q
 
 G = np.array([0.3, -0.2, -9.81])
 #: Oblique axes, with a prismatic joint between revolute joints.
@@ -118,7 +118,7 @@ def test_the_sensors_of_mujoco_measure_the_same(afloat: bool) -> None:
         if afloat:  # linear in the world's axes, angular in the body's, the quaternion's scalar first
             R = base.placement[k, :3, :3]
             data.qpos[:3] = base.placement[k, :3, 3]
-            data.qpos[3:7] = np.roll(free_flyer(base)[k, 3:], 1)
+            data.qpos[3:7] = np.roll(free_flyer_q(base)[k, 3:], 1)
             for rates, six in ((data.qvel, base.velocity[k]), (data.qacc, base.acceleration[k])):
                 rates[:3], rates[3:6] = six[:3], R.T @ six[3:]
         mujoco.mj_inverse(model, data)

@@ -153,6 +153,7 @@ def moved(name: str, T: FloatArray) -> Callable[..., FloatArray]:
         ("forearm", rotation("x", 1e-12), "an origin 0 m off, a direction 1e-12"),
         ("tool", rotation("z", 1e-12), "an origin 0 m off, a direction 1e-12"),
         ("tool", shift(0.0, 1e-12, 0.0), "an origin 1e-12 m off, a direction 0"),
+        ("forearm", np.full((4, 4), np.nan), "an origin nan m off, a direction nan"),
     ],
 )
 def test_a_wrong_origin_alone_or_a_wrong_direction_alone_is_a_disagreement(

@@ -151,7 +151,7 @@ def test_pinocchios_jacobians_are_equal_in_blocks_and_in_one_call(
         query = QueryBatch(frames, (robot.sample(n, 1),), "world")
         at_once = oracle.jacobians(query)
         with monkeypatch.context() as patch:
-            patch.setattr(pinocchio, "_BLOCK_SIZE", size)
+            patch.setattr(pinocchio, "_FLOATS_PER_BLOCK", size)
             blocks = [block.copy() for block in oracle.jacobian_blocks(query)]
         assert np.concatenate(blocks).tobytes() == at_once.tobytes()
         assert len(blocks) == 1 or all(block.size <= max(size, at_once[0].size) for block in blocks)

@@ -96,7 +96,7 @@ def test_the_bound_of_an_imu_has_the_scale_with_gravity_and_the_factors_of_an_ac
     inputs = np.array([[0.3, 0.5], [1.5, -2.0], [0.7, 0.2]])
     call = Call(robot.tree, robot.plan, "l3", LOCAL, None, list(inputs), gravity=[3.0, 0.0, 4.0])
     part = call.select(slice(0, 1))
-    _, bound = derived.check_imu(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
+    _, bound = derived.derive_imu_reading(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
     v, a = part.rates
     size = compute_magnitudes(part.plan, part.q, v, a, part.state)
     linear = (size.acc + size.w * size.vel + 5.0).item()
@@ -105,9 +105,18 @@ def test_the_bound_of_an_imu_has_the_scale_with_gravity_and_the_factors_of_an_ac
 
 def test_the_bound_of_a_relative_placement_includes_both_paths() -> None:
     robot = urdfkin.load(ARM)
-    call = Call(robot.tree, robot.plan, "l3", ALIGNED, None, ([0.3, 0.5],), also=("l2",), relative_to="l2")
+    call = Call(
+        robot.tree,
+        robot.plan,
+        "l3",
+        ALIGNED,
+        None,
+        ([0.3, 0.5],),
+        additional_frames=("l2",),
+        relative_to="l2",
+    )
     part = call.select(slice(0, 1))
-    _, bound = derived.check_relative_placement(
+    _, bound = derived.derive_relative_placement(
         PLACEMENT.bound, robot.verifier.oracle(), part, np.zeros((1, 1, 4, 4)), PINOCCHIO
     )
     size = compute_magnitudes(part.plan, part.q, None, None, part.state)

@@ -37,7 +37,7 @@ from urdfkin.system.documents import (
     doc,
     of_length,
 )
-from urdfkin.verify.oracles import PINOCCHIO, versions
+from urdfkin.verify.oracles import PINOCCHIO, package_versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
@@ -240,7 +240,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     )
     document = {
         "schema": SAME.name,
-        "versions": versions(),
+        "versions": package_versions(),
         "sha256": result.digests,
         "verdict": result.verdict,
         "command": command,

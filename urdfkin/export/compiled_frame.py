@@ -399,7 +399,7 @@ class CompiledFrame:
                 return out
         call = self._make_call(inputs)
         to = call.flatten_out(out, row.result_shape(self._tree.nv))
-        result = call.compute(self._run_call, task, row, call, to, threads)
+        result = call.run_and_locate_error(self._run_call, task, row, call, to, threads)
         self._robot.verifier.ledger.count_unchecked(name, call.result_count)
         return call.restore_shape(result) if out is None else out
 

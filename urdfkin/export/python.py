@@ -17,7 +17,7 @@ from urdfkin.errors import InputError
 from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function
-from urdfkin.verify.bounds import column_weights
+from urdfkin.verify.bounds import sum_multipliers
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ def _rotation_rate_bound(plan: CompiledTree) -> float:
             <= (3 F)^3
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
-    return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
+    return max(3.0 if floats else 1.0, float(sum_multipliers(plan)[0].max(initial=0.0)))
 
 
 def _function_list(code: FrameCode) -> str:

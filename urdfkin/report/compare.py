@@ -55,7 +55,7 @@ from urdfkin.validation.document import (
     Units,
     outcome_of,
 )
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import package_versions
 
 _MAX_LENGTH = 200
 #: Displayed poses are rounded to nine decimals.
@@ -235,7 +235,7 @@ class ReportComparison:
     def as_dict(self, command: str | None = None) -> ComparisonDocument:
         document = {
             "schema": COMPARISON.name,
-            "versions": versions(),
+            "versions": package_versions(),
             "sha256": self.sha256,
             "verdict": COMPARISON.verdicts[bool(self.regressions)],
             "command": command,

@@ -32,7 +32,7 @@ from urdfkin.report.words import (
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, as_json_data, doc, parse_json
 from urdfkin.system.files import MAX_BYTES, abbreviate_path, is_folder, read_bytes
 from urdfkin.validation.document import OUTCOMES, VALIDATION, BoundRatio, Document, ReportedRobot, Units
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import package_versions
 
 #: Maximum number of reports, and of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
@@ -145,7 +145,7 @@ class History:
         latest = [points[-1]["sha256"] for points in self.robots.values() if points[-1]["run"] == last]
         document = {
             "schema": HISTORY.name,
-            "versions": versions(),
+            "versions": package_versions(),
             "sha256": latest,
             "verdict": self.runs[-1]["verdict"],
             "command": command,
@@ -442,7 +442,7 @@ def as_html(history: History, command: str | None = None) -> str:
         units=format_units,
         share=_ratio_cell,
         command=command,
-        versions=versions(),
+        versions=package_versions(),
     )
 
 

@@ -391,7 +391,7 @@ def as_html(
 ) -> str:
     """Return an HTML page with the answer; the template escapes all names."""
     from urdfkin.report.html import format_date, render_template
-    from urdfkin.verify.oracles import versions
+    from urdfkin.verify.oracles import package_versions
 
     moment = started or datetime.now(UTC)
     frames = far_frames(sameness)
@@ -406,7 +406,7 @@ def as_html(
         narrowed_head=MIMIC_LIMITS_HEADING.capitalize(),
         started=moment.isoformat(timespec="seconds"),
         when=format_date(moment.isoformat(timespec="seconds")),
-        versions=versions(),
+        versions=package_versions(),
         command=command_of(robots, question, options),
         heads=HEADS,
         farthest=frames_heading(sameness),

@@ -835,10 +835,14 @@ class Robot(Displayable):
         # Subclasses of str may print names differently in error messages.
         # A plain str avoids the difference.
         name = name if isinstance(name, FrameName) else str(name)
-        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
+        call = Call(
+            self.tree, self.plan, frame, _ALIGNED, None, (q,), additional_frames=(name,), relative_to=name
+        )
         to = call.flatten_out(out, (4, 4))
         self.verifier.require_pinocchio(verify)
-        T_world = call.compute(PLACEMENT.compute_results, call.plan, (call.q,), None, threads=threads)
+        T_world = call.run_and_locate_error(
+            PLACEMENT.compute_results, call.plan, (call.q,), None, threads=threads
+        )
         T = relative_pose(T_world[:, -1:], T_world[:, :-1], to)
         result = call.restore_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
@@ -1151,8 +1155,10 @@ class Robot(Displayable):
         to = call.flatten_out(out, (rows, self.nv))
         J = np.empty((call.n, len(call.links), rows, self.nv)) if to is None else to
         walk, state = (call.plan, (call.q,), _ALIGNED), {"base": call.state, "threads": threads}
-        Rs = call.compute(PLACEMENT.compute_results, *walk, **state)[..., :3, :3]
-        Js_v = call.compute(JACOBIAN.compute_results, *walk, out=J if rows == 6 else None, **state)
+        Rs = call.run_and_locate_error(PLACEMENT.compute_results, *walk, **state)[..., :3, :3]
+        Js_v = call.run_and_locate_error(
+            JACOBIAN.compute_results, *walk, out=J if rows == 6 else None, **state
+        )
         too_near: list[tuple[float, int]] = []
 
         def compute(part: slice) -> None:
@@ -1219,7 +1225,7 @@ class Robot(Displayable):
         self.verifier.require_pinocchio(verify)
         to = call.flatten_out(out, (len(moving_joints(self.tree, call.links[0])), len(ACCELERATION_KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
-        parts: AccelerationBreakdown = call.compute(
+        parts: AccelerationBreakdown = call.run_and_locate_error(
             ACCELERATION_BREAKDOWN.compute, *flat, out=None if to is None else to[:, 0], threads=threads
         )
         base_part, terms = (x.reshape(*call.shape, *x.shape[1:]) for x in (parts.base, parts.terms))
@@ -1654,7 +1660,7 @@ class Robot(Displayable):
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
         to = call.flatten_out(out, row.result_shape(self.nv))
         self.verifier.require_pinocchio(verify)
-        results = call.compute(
+        results = call.run_and_locate_error(
             row.compute_results,
             call.plan,
             (call.q, *call.rates),
@@ -1672,7 +1678,7 @@ class Robot(Displayable):
     def _sample_jacobians(self, frame: str) -> FloatArray:
         """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_RANK_SAMPLES),))
-        J: FloatArray = call.compute(JACOBIAN.compute_results, call.plan, (call.q,), _ALIGNED)
+        J: FloatArray = call.run_and_locate_error(JACOBIAN.compute_results, call.plan, (call.q,), _ALIGNED)
         return J[:, 0]
 
     def _find_evaluator(

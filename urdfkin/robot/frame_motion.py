@@ -20,7 +20,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import Trajectory
-from urdfkin.verify.bounds import find_active_entries, result_k
+from urdfkin.verify.bounds import broadcast_k, find_active_entries
 from urdfkin.verify.call import Call
 from urdfkin.verify.comparison import worst_disagreements
 from urdfkin.verify.quantities import (
@@ -183,7 +183,7 @@ def frame_motion(
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, base, given)
     inputs, reference, state = (call.q, *call.rates), call.reference, call.state
     ours = {
-        row: call.compute(row.compute_results, call.plan, inputs, reference, base=state)
+        row: call.run_and_locate_error(row.compute_results, call.plan, inputs, reference, base=state)
         for row in validated_quantities()
     }
     at_origin = base is None or not base.placement[..., :3, 3].any()
@@ -199,7 +199,9 @@ def frame_motion(
         acceleration,
         jacobian,
         find_active_entries(call.plan, reference, root_at_origin=at_origin)[0],
-        call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state),
+        call.run_and_locate_error(
+            acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state
+        ),
         {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
         reason,
     )
@@ -210,5 +212,5 @@ def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> MotionC
         row, robot.verifier.oracle(call.base), call.select(slice(0, call.n)), ours
     )
     units = worst_disagreements(ours, theirs, bound.scale, 2)
-    k = np.broadcast_to(result_k(bound, units.shape), units.shape)
+    k = np.broadcast_to(broadcast_k(bound, units.shape), units.shape)
     return MotionCheck(units[:, 0], (units / k)[:, 0], k[:, 0])

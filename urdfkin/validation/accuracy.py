@@ -32,10 +32,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.bounds import (
+    broadcast_k,
     compute_magnitudes,
     euler_jacobian_bound,
     quaternion_jacobian_bound,
-    result_k,
     singularity_margin,
 )
 from urdfkin.verify.call import Call
@@ -199,7 +199,7 @@ class _AccuracyBatch:
         for name in representations:
             if name == QUATERNION:
                 bound, quaternions = quaternion_jacobian_bound(jacobian), quaternion_of(R)
-                is_regular = np.abs(quaternions[..., 3]) > EPS * result_k(bound, quaternions.shape[:-1])
+                is_regular = np.abs(quaternions[..., 3]) > EPS * broadcast_k(bound, quaternions.shape[:-1])
                 true = quaternion_jacobian(
                     exact_quaternion(R_true[is_regular], quaternions[is_regular]), J_true[is_regular]
                 )

@@ -285,7 +285,9 @@ class _FrameComparison(_Comparison):
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        return QueryBatch(frames, inputs, reference, frames_are_joints=joints, is_partial=True)
+        return QueryBatch(
+            frames, inputs, reference, frames_are_joints=joints, uses_multi_frame_functions=True
+        )
 
     def _compare_quantity(
         self,

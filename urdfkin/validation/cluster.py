@@ -36,7 +36,7 @@ from urdfkin.validation.answer import (
 from urdfkin.validation.engines import AnswerCallback, Task, Work
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.verify.oracles import version
+from urdfkin.verify.oracles import package_version
 
 #: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * (threads of all workers) + _EXTRA_CHUNKS.
 #: Every thread then always has a next chunk.
@@ -167,7 +167,7 @@ def _check_versions(client: Client) -> None:
     """Raise ClusterError on a difference, before any robot or chunk is sent to the cluster."""
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
-            remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
+            remedy = f"install urdfkin {package_version('urdfkin')} on the worker's machine"
             raise ClusterError("a worker cannot run urdfkin", where=worker, found=str(found), remedy=remedy)
         _check_code(worker, found)
     for name in _COMPARED_PACKAGES:
@@ -175,7 +175,7 @@ def _check_versions(client: Client) -> None:
             found = client.run_on_scheduler(metadata.version, name)
         except Exception:  # The scheduler computes nothing and does not need the package.
             continue
-        own = version(name)
+        own = package_version(name)
         if own not in (found, "a checkout"):
             _raise_difference("scheduler", [f"{name} {found} on the cluster and {own} on this machine"])
 

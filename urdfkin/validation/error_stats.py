@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.bounds import Bound, result_k
+from urdfkin.verify.bounds import Bound, broadcast_k
 from urdfkin.verify.comparison import worst_disagreements
 
 #: The libraries of a cross check, in the order of columns.
@@ -115,7 +115,7 @@ def make_cross_check(
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
     units = worst_disagreements(one, other, bound.scale, 2)
-    bound_ratio = _nan_as_infinity(units / result_k(bound, units.shape))
+    bound_ratio = _nan_as_infinity(units / broadcast_k(bound, units.shape))
     agrees = bound_ratio <= 1.0
     return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(bound_ratio.max()))
 
@@ -243,7 +243,7 @@ def compute_error_stats(
             n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None
         )
     units = worst_disagreements(results, oracle_results, bound.scale, 2)
-    bound_ratio = _nan_as_infinity(units / result_k(bound, units.shape))
+    bound_ratio = _nan_as_infinity(units / broadcast_k(bound, units.shape))
     k, f = divmod(int(bound_ratio.argmax()), count)
     q, v, a = inputs[k]
     case = WorstCase(

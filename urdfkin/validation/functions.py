@@ -29,9 +29,9 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import as_json_data
 from urdfkin.validation.diagnosis import DiagnosisCase, Mistakes, as_tuple, diagnose
-from urdfkin.verify.bounds import result_k
+from urdfkin.verify.bounds import broadcast_k
 from urdfkin.verify.comparison import disagreement
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import package_versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.quantities import find_quantity as quantity_of
 from urdfkin.verify.verifier import Verifier, compute_bound, compute_oracle_results_with_bound
@@ -181,7 +181,7 @@ class FunctionCheck(Displayable):
         >>> check.as_dict()["agrees"]
         True
         """
-        return {"agrees": self.agrees, **as_json_data(self), "versions": versions()}
+        return {"agrees": self.agrees, **as_json_data(self), "versions": package_versions()}
 
     def _text_document(self) -> TextDocument:
         of = f"{self.quantity} of {self.frame}" + (f" ({self.reference})" if self.reference else "")
@@ -469,7 +469,7 @@ class _Run:
         else:
             bound = compute_bound(row, part)
         scale = np.broadcast_to(bound.scale, with_frame_axis.shape)[:, 0]
-        k = result_k(bound, with_frame_axis.shape[:2])[:, 0] * self.factor
+        k = broadcast_k(bound, with_frame_axis.shape[:2])[:, 0] * self.factor
         expected = self._convert_result(native_inputs, result)
         inputs: tuple[FloatArray, ...] = native_inputs
         if self.conversion is not None:

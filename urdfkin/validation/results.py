@@ -24,7 +24,7 @@ from urdfkin.validation.chunk import Timings
 from urdfkin.validation.document import VALIDATION, Document, RunOutcome, ValidationVerdict, outcome
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, ErrorStats, Key
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
-from urdfkin.verify.oracles import ORACLES, version, versions
+from urdfkin.verify.oracles import ORACLES, package_version, package_versions
 from urdfkin.verify.quantities import QUANTITIES, format_replay_command
 
 if TYPE_CHECKING:
@@ -45,7 +45,10 @@ def provenance() -> dict[str, str]:
     The digest of the code does not include the packages in `_DISPLAY_PACKAGES`.
     """
     equations = hashlib.sha256(read_bytes(_PACKAGE_FOLDER / "kinematics" / "equations.py")).hexdigest()
-    return {name: version(name) for name in LIBRARIES} | {"code": _digest_code(), "equations": equations}
+    return {name: package_version(name) for name in LIBRARIES} | {
+        "code": _digest_code(),
+        "equations": equations,
+    }
 
 
 def _digest_code() -> str:
@@ -247,7 +250,8 @@ class ValidationReport(Displayable):
         studies = iter(self.studies)  # Only compared robots have an accuracy result.
         document = {
             "schema": VALIDATION.name,
-            "versions": self.library_versions or versions(robot.origin.oracle for robot in self.robots),
+            "versions": self.library_versions
+            or package_versions(robot.origin.oracle for robot in self.robots),
             "sha256": [robot.summary.model and robot.summary.model["sha256"] for robot in self.robots],
             "verdict": self.outcome.verdict,
             "command": self.command,

@@ -54,7 +54,7 @@ from urdfkin.validation.answer import (
 from urdfkin.validation.chunk import Chunking
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.verify.oracles import version, versions
+from urdfkin.verify.oracles import package_version, package_versions
 
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import AccuracyStudy
@@ -98,7 +98,7 @@ class Manifest:
     def of(cls, robot_inputs: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
         robots = tuple((robot_input.origin, robot_input.sha256) for robot_input in robot_inputs)
         oracles = (robot_input.origin.oracle for robot_input in robot_inputs)
-        return cls(robots, samples, seed, provenance(), versions(oracles), started)
+        return cls(robots, samples, seed, provenance(), package_versions(oracles), started)
 
     @cached_property
     def chunking(self) -> Chunking:
@@ -564,7 +564,13 @@ class AccuracyStore:
         manifest = self._store.manifest
         origin, sha256 = manifest.robots[robot]
         origin = replace(origin, oracle=None)  # The study uses no second oracle.
-        parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), sha256]
+        parts = [
+            manifest.provenance,
+            package_version("python-flint"),
+            asdict(self._settings),
+            asdict(origin),
+            sha256,
+        ]
         return hashlib.sha256(json.dumps([_LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
 
 

@@ -1,15 +1,20 @@
 """Read a robot file with other libraries, with one adapter for each library.
 
 Besides the standard library, this module imports only NumPy and the chosen library. The command `urdfkin
-readers` imports this module. `scripts/make_libraries.py` runs this module as a program, with the Python
-interpreter of a virtual environment in which one library is installed:
+readers` runs `main` in a new process. `scripts/make_libraries.py` runs this module as a program, with the
+Python interpreter of a virtual environment in which one library is installed:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
-case. A configuration maps the name of each independent joint to the joint's value. The value of a revolute or
-prismatic joint is one number (rad or m). The value of a planar joint is three numbers (x, y, angle). The
-value of a floating joint is seven numbers (x, y, z, qx, qy, qz, qw).
+case. `text` is a URDF text, or the path of an MJCF or USD file. A configuration maps the name of each
+independent joint to the joint's value:
+
+| Joint | Value |
+|---|---|
+| revolute or prismatic | one number (rad or m) |
+| planar | three numbers (x, y, angle) |
+| floating | seven numbers (x, y, z, qx, qy, qz, qw) |
 
 An adapter passes all inputs that the library's documentation requires. An adapter gives the library only the
 values of independent joints. The library can read the mimic rules in the file. If the library computes wrong
@@ -41,7 +46,7 @@ JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
 #: Suffixes of the joints that replace a planar joint in MuJoCo.
-_MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
+_MUJOCO_PLANAR_SUFFIXES = ("_TX", "_TY", "_RZ")
 
 
 @dataclass(frozen=True)
@@ -50,14 +55,14 @@ class LibraryModel:
 
     Attributes:
         joints: Names of the joints with a coordinate.
-        poses: Returns the pose (4, 4) of each link relative to the root.
-            The result contains no merged links.
+        compute_poses: Returns the pose (4, 4) of each link, without links that the library merged with
+            others. URDF: relative to the root link. MJCF and USD: relative to the world.
     """
 
     joints: list[str]
-    poses: Callable[[Mapping[str, JointValue]], Poses]
+    compute_poses: Callable[[Mapping[str, JointValue]], Poses]
 
-    def find_missing_joints(self, values: Mapping[str, JointValue]) -> list[str]:
+    def find_joints_without_coordinate(self, values: Mapping[str, JointValue]) -> list[str]:
         return [name for name in values if name not in self.joints]
 
 
@@ -104,16 +109,16 @@ def _make_relative(poses: Poses, root: str) -> Poses:
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
 
-def read_pinocchio(text: str) -> LibraryModel:
+def read_pinocchio(source: str) -> LibraryModel:
     import pinocchio as pin
 
-    if _is_path(text):
-        model, root = pin.buildModelFromMJCF(text), "universe"
+    if _is_path(source):
+        model, root = pin.buildModelFromMJCF(source), "universe"
     else:
-        model, root = pin.buildModelFromXML(text, mimic=True), _find_root(text)
+        model, root = pin.buildModelFromXML(source, mimic=True), _find_root(source)
     data = model.createData()
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         q = pin.neutral(model)
         for name, value in values.items():
             if not model.existJointName(name):
@@ -134,15 +139,15 @@ def read_pinocchio(text: str) -> LibraryModel:
 
     # In Pinocchio, joint 0 is the world.
     moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
-    return LibraryModel(moving, poses)
+    return LibraryModel(moving, compute_poses)
 
 
-def read_mujoco(text: str) -> LibraryModel:
+def read_mujoco(source: str) -> LibraryModel:
     import mujoco
 
     root = "world"
-    if not _is_path(text):
-        root, robot = _find_root(text), ET.fromstring(text)
+    if not _is_path(source):
+        root, robot = _find_root(source), ET.fromstring(source)
         options = {
             "fusestatic": "false",
             "boundmass": "0.001",
@@ -151,17 +156,19 @@ def read_mujoco(text: str) -> LibraryModel:
         }
         robot.insert(0, extension := ET.Element("mujoco"))
         ET.SubElement(extension, "compiler", options)
-        text = ET.tostring(robot, "unicode")
+        source = ET.tostring(robot, "unicode")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        model = (mujoco.MjModel.from_xml_path if _is_path(text) else mujoco.MjModel.from_xml_string)(text)
+        model = (mujoco.MjModel.from_xml_path if _is_path(source) else mujoco.MjModel.from_xml_string)(source)
     data = mujoco.MjData(model)
     names = [model.joint(i).name for i in range(model.njnt)]
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         data.qpos[:] = model.qpos0
-        given = {own: x for name, value in values.items() for own, x in _mujoco_values(name, value, names)}
-        for name, value in given.items():
+        own_values = {
+            own: x for name, value in values.items() for own, x in _split_mujoco_value(name, value, names)
+        }
+        for name, value in own_values.items():
             at = model.jnt_qposadr[names.index(name)]
             if model.jnt_type[names.index(name)] == mujoco.mjtJoint.mjJNT_FREE:
                 data.qpos[at : at + 7] = np.r_[value[:3], value[6], value[3:6]]
@@ -172,17 +179,21 @@ def read_mujoco(text: str) -> LibraryModel:
             {model.body(i).name: _make_pose(data.xmat[i], data.xpos[i]) for i in range(model.nbody)}, root
         )
 
-    planar = {name.removesuffix(_MUJOCO_PLANAR[0]) for name in names if name.endswith(_MUJOCO_PLANAR[0])}
-    found = [name for name in names if name[: -len(_MUJOCO_PLANAR[0])] not in planar]
-    return LibraryModel([*found, *sorted(planar)], poses)
+    planar = {
+        name.removesuffix(_MUJOCO_PLANAR_SUFFIXES[0])
+        for name in names
+        if name.endswith(_MUJOCO_PLANAR_SUFFIXES[0])
+    }
+    found = [name for name in names if name[: -len(_MUJOCO_PLANAR_SUFFIXES[0])] not in planar]
+    return LibraryModel([*found, *sorted(planar)], compute_poses)
 
 
-def _mujoco_values(name: str, value: JointValue, names: list[str]) -> Iterator[tuple[str, JointValue]]:
-    """Split a joint value among MuJoCo's joints."""
+def _split_mujoco_value(name: str, value: JointValue, names: list[str]) -> Iterator[tuple[str, JointValue]]:
+    """A planar joint is three joints in MuJoCo."""
     if name in names:
         yield name, value
-    elif name + _MUJOCO_PLANAR[0] in names:
-        yield from zip((name + suffix for suffix in _MUJOCO_PLANAR), value, strict=True)
+    elif name + _MUJOCO_PLANAR_SUFFIXES[0] in names:
+        yield from zip((name + suffix for suffix in _MUJOCO_PLANAR_SUFFIXES), value, strict=True)
 
 
 def read_drake(text: str) -> LibraryModel:
@@ -207,17 +218,17 @@ def read_drake(text: str) -> LibraryModel:
         plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_find_robot_name(text)))
     ]
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         q = plant.GetPositions(context).copy()
         for name, value in values.items():
             if name in joints:
-                at, many = joints[name].position_start(), joints[name].num_positions()
-                own = np.r_[value[6], value[3:6], value[:3]] if many == _FLOATING else value
-                q[at : at + many] = own
+                start, count = joints[name].position_start(), joints[name].num_positions()
+                numbers = np.r_[value[6], value[3:6], value[:3]] if count == _FLOATING else value
+                q[start : start + count] = numbers
         plant.SetPositions(context, q)
         return {b.name(): plant.EvalBodyPoseInWorld(context, b).GetAsMatrix4() for b in bodies}
 
-    return LibraryModel(list(joints), poses)
+    return LibraryModel(list(joints), compute_poses)
 
 
 def _find_robot_name(text: str) -> str:
@@ -239,7 +250,7 @@ def read_idyntree(text: str) -> LibraryModel:
     kin_dyn.setFloatingBase(root)
 
     # The argument `_loader` keeps the loader and the model alive.
-    def poses(values: Mapping[str, JointValue], _loader: Any = loader) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue], _loader: Any = loader) -> Poses:
         q = np.zeros(model.getNrOfPosCoords())
         for name in q_slots.keys() & values.keys():
             q[q_slots[name]] = _as_scalar(values[name])
@@ -249,7 +260,7 @@ def read_idyntree(text: str) -> LibraryModel:
         relative = kin_dyn.getRelativeTransform
         return {link: relative(root, link).asHomogeneousTransform().toNumPy() for link in links}
 
-    return LibraryModel(sorted(q_slots, key=q_slots.__getitem__), poses)
+    return LibraryModel(sorted(q_slots, key=q_slots.__getitem__), compute_poses)
 
 
 def read_yourdfpy(text: str) -> LibraryModel:
@@ -259,11 +270,11 @@ def read_yourdfpy(text: str) -> LibraryModel:
     model = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
     root = model.base_link
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         model.update_cfg({name: values[name] for name in model.actuated_joint_names if name in values})
         return {link: model.get_transform(link, root) for link in model.link_map}
 
-    return LibraryModel(list(model.actuated_joint_names), poses)
+    return LibraryModel(list(model.actuated_joint_names), compute_poses)
 
 
 def read_urchin(text: str) -> LibraryModel:
@@ -273,14 +284,18 @@ def read_urchin(text: str) -> LibraryModel:
         model = urchin.URDF.load(path, lazy_load_meshes=True)
     names = [joint.name for joint in model.actuated_joints]
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
-        own = {name: _urchin_value(model.joint_map[name], values[name]) for name in names if name in values}
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
+        own = {
+            name: _convert_urchin_value(model.joint_map[name], values[name])
+            for name in names
+            if name in values
+        }
         return dict(model.link_fk(cfg=own, use_names=True))
 
-    return LibraryModel(names, poses)
+    return LibraryModel(names, compute_poses)
 
 
-def _urchin_value(joint: Any, value: JointValue) -> JointValue:
+def _convert_urchin_value(joint: Any, value: JointValue) -> JointValue:
     if joint.joint_type != "floating":
         return value
     return _make_pose(_rotation_from_quaternion(value[3:]), value[:3])
@@ -301,11 +316,11 @@ def read_kinpy(text: str) -> LibraryModel:
     chain = kinpy.build_chain_from_urdf(text.encode())
     names = list(chain.get_joint_parameter_names())
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         found = chain.forward_kinematics({name: _as_scalar(values.get(name, 0.0)) for name in names})
         return _make_relative({link: pose.matrix() for link, pose in found.items()}, _find_root(text))
 
-    return LibraryModel(names, poses)
+    return LibraryModel(names, compute_poses)
 
 
 def read_ikpy(text: str) -> LibraryModel:
@@ -320,14 +335,14 @@ def read_ikpy(text: str) -> LibraryModel:
         warnings.simplefilter("ignore")
         chain = Chain.from_urdf_file(path, base_elements=[root])
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         q = [_as_scalar(values.get(link.name, 0.0)) for link in chain.links]
         found = chain.forward_kinematics(q, full_kinematics=True)
         names = [children.get(link.name, root) for link in chain.links]
         return dict(zip(names, found, strict=True))
 
     moving = [link.name for link in chain.links if link.name in children and link.joint_type != "fixed"]
-    return LibraryModel(moving, poses)
+    return LibraryModel(moving, compute_poses)
 
 
 def read_roboticstoolbox(text: str) -> LibraryModel:
@@ -338,13 +353,13 @@ def read_roboticstoolbox(text: str) -> LibraryModel:
         robot = rtb.Robot.URDF(path, gripper=None)
     moving = {joints[link.name]: link.jindex for link in robot.links if link.isjoint}
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         q = np.zeros(robot.n)
         for name in moving.keys() & values.keys():
             q[moving[name]] = _as_scalar(values[name])
         return {link.name: robot.fkine(q, end=link.name).A for link in robot.links}
 
-    return LibraryModel(sorted(moving, key=moving.__getitem__), poses)
+    return LibraryModel(sorted(moving, key=moving.__getitem__), compute_poses)
 
 
 def read_skrobot(text: str) -> LibraryModel:
@@ -354,14 +369,14 @@ def read_skrobot(text: str) -> LibraryModel:
         robot = RobotModelFromURDF(urdf_file=path)
     joints = {joint.name: joint for joint in robot.joint_list}
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         for name in joints.keys() & values.keys():
             joints[name].joint_angle(_as_scalar(values[name]))
         return _make_relative(
             {link.name: link.worldcoords().T() for link in robot.link_list}, _find_root(text)
         )
 
-    return LibraryModel(list(joints), poses)
+    return LibraryModel(list(joints), compute_poses)
 
 
 def read_newton(path: str) -> LibraryModel:
@@ -382,7 +397,7 @@ def read_newton(path: str) -> LibraryModel:
     }
     bodies = [str(label).rpartition("/")[2] for label in builder.body_label]
 
-    def poses(values: Mapping[str, JointValue]) -> Poses:
+    def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         q = model.joint_q.numpy()
         for name in q_slots.keys() & values.keys():
             start, count = q_slots[name]
@@ -396,7 +411,7 @@ def read_newton(path: str) -> LibraryModel:
             for name, rotation, p in zip(bodies, rotations, state.body_q.numpy()[:, :3], strict=True)
         }
 
-    return LibraryModel(list(q_slots), poses)
+    return LibraryModel(list(q_slots), compute_poses)
 
 
 @dataclass(frozen=True)
@@ -437,15 +452,17 @@ def version(name: str) -> str | None:
 def evaluate_case(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
     """An exception of the library becomes the entry `error`."""
     try:
-        reading = LIBRARIES[name].read(case["text"])
-        found = [reading.poses(values) for values in case["configurations"]]
+        model = LIBRARIES[name].read(case["text"])
+        found = [model.compute_poses(values) for values in case["configurations"]]
     except Exception as error:  # The libraries raise many types of exceptions.
         words = " ".join(str(error).split())
         return {"error": f"{type(error).__name__}: {words}" if words else type(error).__name__}
     poses = [{link: np.asarray(T, float).tolist() for link, T in one.items()} for one in found]
     return {
-        "joints": reading.joints,
-        "unset": reading.find_missing_joints(case["configurations"][0] if case["configurations"] else {}),
+        "joints": model.joints,
+        "unset": model.find_joints_without_coordinate(
+            case["configurations"][0] if case["configurations"] else {}
+        ),
         "poses": poses,
     }
 
@@ -458,8 +475,7 @@ def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[s
 def main() -> None:
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    # Libraries print to standard error.
-    # The results go to standard output.
+    # Standard output receives only the results; text that a library prints goes to standard error.
     output = os.dup(1)
     os.dup2(2, 1)
     for line in _evaluate_cases(sys.argv[1], json.load(sys.stdin)):

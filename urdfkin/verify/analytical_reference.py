@@ -12,31 +12,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[Any]
+AnyArray = NDArray[Any]
 
 
-def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
+def euler_jacobian(axes: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, AnyArray]:
     """Return the Jacobian of position and Euler angles.
 
-    The rotation R = R_i R_j R_k has these rotation axes:
+    R = R_i R_j R_k is a product of three rotations about coordinate axes. The rotation axes in the world are:
 
         first axis = e_i
         third axis = R e_k
         n = e_i x R e_k
-        middle axis = n / |n| or -n / |n|, perpendicular to both
+        middle axis = sign n / |n|, perpendicular to both
         k = i:  middle angle b in [0, pi],  sign +1,  |n| = |sin b|
         k != i:  middle angle b in [-pi/2, pi/2],  sign (e_j x e_i) . e_k,  |n| = |cos b|
         derivative of an angle = (reciprocal basis vector of its axis) . (angular velocity)
 
     Args:
-        name: Axes as in SciPy, for example "ZYX" for body axes or "xyz" for fixed axes.
+        axes: Axes as in SciPy, for example "ZYX" for body axes or "xyz" for fixed axes.
         R: (..., 3, 3) rotation from body axes to world axes.
         J_v: (..., 6, n) velocity Jacobian [linear; angular], world axes.
 
     Returns:
         The Jacobian (..., 6, n), and |sin b| or |cos b| (...).
     """
-    letters = name.lower()[::-1] if name.islower() else name.lower()
+    letters = axes.lower()[::-1] if axes.islower() else axes.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
     first, third = np.eye(3)[i], R[..., :, k]
     n = np.cross(first, third)
@@ -46,11 +46,11 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
         middle = sign * n / length
         volume = -sign * length  # The volume is first . (middle x third).
         reciprocal = [np.cross(middle, third) / volume, middle, np.cross(first, middle) / volume]
-    rows = np.stack(reciprocal[::-1] if name.islower() else reciprocal, axis=-2)
+    rows = np.stack(reciprocal[::-1] if axes.islower() else reciprocal, axis=-2)
     return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), length[..., 0]
 
 
-def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
+def quaternion_jacobian(quat: AnyArray, J_v: AnyArray) -> AnyArray:
     """Return the Jacobian of position and quaternion.
 
     The derivative of `quat` is half a quaternion product:

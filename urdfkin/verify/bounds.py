@@ -4,8 +4,9 @@ A result is accepted if no number differs from the oracle's number by more than 
 
     k * eps * scale
     eps = 2^-52
-    k = factors * PINOCCHIO_ROUNDINGS * joints
+    k = factors * (PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps)
     joints = number of URDF joints on the path + 1, or + 2 for a rotated base
+    tilt = sum of the tilts of these joints, rad (`urdfkin.kinematics.roundings`)
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms, in the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel.
@@ -13,7 +14,8 @@ The scale can be broadcast to the shape of the results.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. Rotations do
-not amplify errors. The error therefore grows linearly with the number of joints.
+not amplify errors. The error therefore grows linearly with the number of joints. The tilts add the error that
+Pinocchio makes if it replaces an axis by a coordinate axis.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -68,21 +70,21 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-KERNELS = "urdfkin.verify.kernels"
+VERIFY_KERNELS_MODULE = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
 #: First indices of position, velocities and accelerations in the state of a moving base.
-_BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
-#: Number of configurations per block of the kernel `lengths`.
-#: The five bounds of one link need 2.5 kB per block, so those of several links fit into the L1 cache.
+_BASE_VECTOR_STARTS = 9, 12, 15, 18, 21
+#: Number of configurations per block of the kernel `lengths`. The five bounds of one link need 2.5 kB per
+#: block, so the bounds of several links fit into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Magnitudes:
-    """Upper bounds on a frame's position, velocity and acceleration.
+    """Upper bounds on the lengths of a frame's position, velocities and accelerations.
 
     Attributes:
-        p: (n, frames) path length with prismatic displacements, m.
+        p: (n, frames) path length from the world's origin, with the joints' displacements, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
@@ -105,14 +107,16 @@ def compute_magnitudes(
     """Return upper bounds for all frames.
 
     `base` is the result of `BaseMotion.state`: one row for all configurations, or n rows.
-    Without v, only `p` and `roundings` are valid.
+    Without v, only `p` and `roundings` are valid. Without a, the joint accelerations are 0.
     """
     n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
     inputs = (q, base) if v is None or a is None else (q, base, v, a)
-    kernel = preload.get_kernel("lengths", module=KERNELS) if n > 1 and len(inputs) > 2 else None
+    kernel = (
+        preload.get_kernel("lengths", module=VERIFY_KERNELS_MODULE) if n > 1 and len(inputs) > 2 else None
+    )
     if kernel is None:
         begin = time.thread_time()
         _fill_without_kernel(lengths, inputs, out)
@@ -126,11 +130,11 @@ def compute_magnitudes(
 
 
 def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
-    states = [tuple(_norm(base[at : at + 3]) for at in _BASE_VECTOR_INDICES)]
-    for link in lengths.links:
+    q, base, *rates = (_as_columns(x, out.shape[1]) for x in inputs)
+    states = [tuple(_norm_of_columns(base[at : at + 3]) for at in _BASE_VECTOR_STARTS)]
+    for joint in lengths.joints:
         states.append(
-            (_propagate_state if rates else _propagate_position)(link, states[link.parent + 1], q, *rates)
+            (_propagate_state if rates else _propagate_position)(joint, states[joint.parent + 1], q, *rates)
         )
     for end in lengths.ends:
         bounds = (steps.translate_point if rates else _translate_position)(states[end.step + 1], end.length)
@@ -139,31 +143,28 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 
 
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Fill `out` with the compiled kernel.
-
-    The bits equal those of `_fill_without_kernel`.
-    """
-    links = lengths.links
+    """The bits equal those of `_fill_without_kernel`."""
+    joints = lengths.joints
     # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
-        for link in links
-        if link.kind >= JointMotion.PLANAR
-        for x in _free_lengths(link, *(x.T for x in (q, v, a)))
+        for joint in joints
+        if joint.kind >= JointMotion.PLANAR
+        for x in _free_lengths(joint, *(x.T for x in (q, v, a)))
     ]
     kernel(
         *lengths.tables,
         *map(np.ascontiguousarray, (q, v, a)),
         _stack_columns(free),
-        norm(base[:, _BASE_VECTOR_INDICES[0] :].reshape(-1, len(_BASE_VECTOR_INDICES), 3)),
-        np.zeros((len(links) + 2, len(_BASE_VECTOR_INDICES), _BLOCK_LENGTH)),
+        norm(base[:, _BASE_VECTOR_STARTS[0] :].reshape(-1, len(_BASE_VECTOR_STARTS), 3)),
+        np.zeros((len(joints) + 2, len(_BASE_VECTOR_STARTS), _BLOCK_LENGTH)),
         out[:5].reshape(-1),
     )
 
 
 def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
-    """Stack columns of length 1 or n."""
+    """Each column has length 1 or n."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -174,9 +175,10 @@ class _MovingJoint(NamedTuple):
     """A moving joint.
 
     Attributes:
+        parent: Index in `_Lengths.joints` of the previous moving joint; -1: the base.
         length: Path length from the previous moving joint, m.
         multiplier: Absolute mimic multiplier.
-        offset: Absolute mimic offset.
+        offset: Absolute mimic offset, rad or m.
     """
 
     kind: int
@@ -192,7 +194,7 @@ class _FrameEnd(NamedTuple):
     """The part of a frame's path after the last moving joint.
 
     Attributes:
-        step: Index in `_Lengths.links` of the last moving joint on the path; -1: no moving joint.
+        step: Index in `_Lengths.joints` of the last moving joint on the path; -1: no moving joint.
         length: Length after this joint, m.
     """
 
@@ -202,13 +204,9 @@ class _FrameEnd(NamedTuple):
 
 
 class _Lengths(NamedTuple):
-    """Moving joints and frames of a compiled tree.
+    """`tables` contains the numbers of `joints` and `ends` as arrays, for the kernel."""
 
-    Attributes:
-        tables: The same numbers as arrays.
-    """
-
-    links: list[_MovingJoint]
+    joints: list[_MovingJoint]
     ends: list[_FrameEnd]
     tables: tuple[NDArray[Any], ...]
 
@@ -219,31 +217,28 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
         lengths, count = magnitude(plan.lengths).tolist(), len(plan.steps)
         rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
         steps = zip(plan.steps.tolist(), plan.parents.tolist(), lengths[:count], rules, strict=True)
-        links = [
+        joints = [
             _MovingJoint(kind, q, v, parent, length, multiplier, float(magnitude(offset)))
             for (kind, q, v), parent, length, (multiplier, offset) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
         ends = [_FrameEnd(step, frame, length) for (step, frame), length in frames]
         tables = (
-            np.array([link[:4] for link in links], dtype=np.int64).reshape(-1, 4),
-            np.array([link[4:] for link in links]).reshape(-1, 3),
+            np.array([joint[:4] for joint in joints], dtype=np.int64).reshape(-1, 4),
+            np.array([joint[4:] for joint in joints]).reshape(-1, 3),
             np.array([end[:2] for end in ends], dtype=np.int64).reshape(-1, 2),
             np.array([end.length for end in ends]),
         )
-        found = plan.cache["lengths"] = _Lengths(links, ends, tables)
+        found = plan.cache["lengths"] = _Lengths(joints, ends, tables)
     return found
 
 
-def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array.
-
-    For n = 1, the columns are Python numbers.
-    """
+def _as_columns(x: FloatArray, n: int) -> Any:
+    """For n = 1 configurations, the columns are Python numbers, which are faster than arrays."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
-def _norm(x: Any) -> Length:
+def _norm_of_columns(x: Any) -> Length:
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
@@ -252,49 +247,49 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
 
 
 #: Number of translations and number of rotations of a planar joint and of a floating joint.
-_FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
+_TRANSLATION_ROTATION_COUNTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
-def _displacement(link: _MovingJoint, q: Any) -> Length:
-    """Return an upper bound on the length of the joint's translation at q."""
-    if link.kind != JointMotion.PRISMATIC:
-        return _norm(q[link.q : link.q + _FREE_JOINT_SIZES[link.kind][0]])
-    return product(link.multiplier, abs(q[link.q])) + link.offset
+def _bound_displacement(joint: _MovingJoint, q: Any) -> Length:
+    if joint.kind != JointMotion.PRISMATIC:
+        return _norm_of_columns(q[joint.q : joint.q + _TRANSLATION_ROTATION_COUNTS[joint.kind][0]])
+    return product(joint.multiplier, abs(q[joint.q])) + joint.offset
 
 
-def _propagate_position(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
-    turns = link.kind == JointMotion.REVOLUTE
-    return _translate_position(state, link.length if turns else link.length + _displacement(link, q))
-
-
-def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the norms of a planar or floating joint's vectors.
-
-    Returns:
-        Norms of displacement, angular and linear velocity, angular and linear acceleration.
-    """
-    at, (slides, turns) = link.v, _FREE_JOINT_SIZES[link.kind]
-    (u, o), (u_rate, o_rate) = (
-        (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
+def _propagate_position(joint: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
+    is_revolute = joint.kind == JointMotion.REVOLUTE
+    return _translate_position(
+        state, joint.length if is_revolute else joint.length + _bound_displacement(joint, q)
     )
-    return _displacement(link, q), o, u, o_rate, u_rate
 
 
-def _propagate_state(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> LinkBounds:
-    kind, d, at = link.kind, link.length, link.v
+def _free_lengths(joint: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
+    """Return the norms of displacement, angular and linear velocity, angular and linear acceleration."""
+    at, (translations, rotations) = joint.v, _TRANSLATION_ROTATION_COUNTS[joint.kind]
+    (u, o), (u_rate, o_rate) = (
+        (
+            _norm_of_columns(x[at : at + translations]),
+            _norm_of_columns(x[at + translations : at + translations + rotations]),
+        )
+        for x in (v, a)
+    )
+    return _bound_displacement(joint, q), o, u, o_rate, u_rate
+
+
+def _propagate_state(joint: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> LinkBounds:
+    kind, d, at = joint.kind, joint.length, joint.v
     if kind >= JointMotion.PLANAR:
-        displacement, *rates = _free_lengths(link, q, v, a)
+        displacement, *rates = _free_lengths(joint, q, v, a)
         return steps.after_free_joint(state, d + displacement, *rates)
-    rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
+    velocity, acceleration = product(joint.multiplier, abs(v[at])), product(joint.multiplier, abs(a[at]))
     if kind == JointMotion.PRISMATIC:
-        return steps.after_prismatic(state, d + _displacement(link, q), rate, rate_2)
-    return steps.after_revolute(state, d, rate, rate_2)
+        return steps.after_prismatic(state, d + _bound_displacement(joint, q), velocity, acceleration)
+    return steps.after_revolute(state, d, velocity, acceleration)
 
 
-_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+_LOCAL_WORLD_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles becomes inf.
-#: The comparison accepts no result with an infinite scale.
+#: A scale above the range of doubles becomes inf. The comparison accepts no result with an infinite scale.
 _allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -313,25 +308,25 @@ class Bound:
     k: FloatArray
 
 
-def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return `bound.k` in the shape `leading`.
+def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
+    """Broadcast `bound.k` to the batch shape `shape`.
 
     k <= 0 and k = inf become NaN. No result is within the bound if k is NaN.
     """
-    k = bound.k.reshape(bound.k.shape[: len(leading)])
+    k = bound.k.reshape(bound.k.shape[: len(shape)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
-    return k if k.shape == leading else np.broadcast_to(k, leading)
+    return k if k.shape == shape else np.broadcast_to(k, shape)
 
 
 def make_bound(
-    scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _ALIGNED
+    scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _LOCAL_WORLD_ALIGNED
 ) -> Bound:
-    """Return a `Bound`.
+    """Return the bound of a quantity with `factors` factors.
 
     LOCAL_WORLD_ALIGNED: k = factors * roundings
     LOCAL, WORLD: k = (factors + 1) * roundings
     """
-    factors += reference is not _ALIGNED
+    factors += reference is not _LOCAL_WORLD_ALIGNED
     k = factors * magnitudes.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
 
@@ -352,13 +347,13 @@ def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
     | rounding errors for each joint | `MUJOCO_ROUNDINGS` = 30, not `PINOCCHIO_ROUNDINGS` = 24 |
     """
     p = 2.0 * magnitudes.p
-    shared = eq.tangential(magnitudes.w, magnitudes.vel)
+    w_cross_vel = eq.tangential(magnitudes.w, magnitudes.vel)
     return Magnitudes(
         p=p,
         w=magnitudes.w,
         vel=eq.point_velocity(magnitudes.vel, magnitudes.w, p),
         alpha=magnitudes.alpha,
-        acc=eq.point_acceleration(magnitudes.acc + shared, magnitudes.alpha, magnitudes.w, p),
+        acc=eq.point_acceleration(magnitudes.acc + w_cross_vel, magnitudes.alpha, magnitudes.w, p),
         roundings=2.0 * (MUJOCO_ROUNDINGS / PINOCCHIO_ROUNDINGS) * magnitudes.roundings,
     )
 
@@ -427,8 +422,8 @@ def true_value_magnitudes(
     magnitudes = compute_magnitudes(
         replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE
     )
-    more = errors.angles[:, np.newaxis] + 1.5 * errors.rule_count
-    return replace(magnitudes, roundings=magnitudes.roundings + more)
+    additional = errors.angles[:, np.newaxis] + 1.5 * errors.rule_count
+    return replace(magnitudes, roundings=magnitudes.roundings + additional)
 
 
 def placement_scale(plan: CompiledTree, magnitudes: Magnitudes) -> FloatArray:
@@ -467,7 +462,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     """
     scale = bound.scale.copy()
     scale[..., :3, 3] = np.maximum(scale[..., :3, 3], lengths[..., None])
-    scale[..., :3, :] *= 1.0 + (angles / result_k(bound, angles.shape))[..., None, None]
+    scale[..., :3, :] *= 1.0 + (angles / broadcast_k(bound, angles.shape))[..., None, None]
     return Bound(scale, bound.k)
 
 
@@ -499,10 +494,10 @@ def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Re
     | 4 n terms of a breakdown with n joints | n + 3 |
     | allowed for the sums of each joint, in eps | 2, more than both sums need |
     """
-    shared = eq.tangential(magnitudes.w, magnitudes.vel)
-    linear = magnitudes.acc + shared
+    w_cross_vel = eq.tangential(magnitudes.w, magnitudes.vel)
+    linear = magnitudes.acc + w_cross_vel
     if reference.at_world:
-        linear = eq.point_acceleration(linear + shared, magnitudes.alpha, magnitudes.w, magnitudes.p)
+        linear = eq.point_acceleration(linear + w_cross_vel, magnitudes.alpha, magnitudes.w, magnitudes.p)
     return _repeat_as_six_rows(linear, magnitudes.alpha)
 
 
@@ -532,7 +527,7 @@ def jacobian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Refere
 
     The scale of a mimic joint is multiplied by |multiplier|, and added to the mimicked joint's scale.
     """
-    turning, sliding = column_weights(plan)
+    turning, sliding = sum_multipliers(plan)
     linear, angular = eq.turning_column(turning, magnitudes.p[..., None])
     return _repeat_as_six_rows(linear + sliding, angular)
 
@@ -548,7 +543,7 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
         |d'| <= bound on the velocity of the frame's origin
         LOCAL: derivative of components along rotating axes
     """
-    turning, sliding = column_weights(plan)
+    turning, sliding = sum_multipliers(plan)
     w, p, vel = magnitudes.w[..., None], magnitudes.p[..., None], magnitudes.vel[..., None]
     linear, angular = eq.turning_column_rate(turning, eq.axis_rate(w, turning), p, vel)
     linear = linear + eq.axis_rate(w, sliding)
@@ -566,7 +561,7 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
 #: |---|---|---|
 #: | j <= i | first pair, first number | first pair, second number |
 #: | j > i | second pair, first number | second pair, second number |
-_PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
+_CROSS_PRODUCT_COUNTS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
     Reference.LOCAL: ((0.0, 0.0), (3.0, 1.0)),
@@ -584,7 +579,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     | entry with mimic joints | sum over several pairs; the scales are added |
     | lever arm d | at most as long as the path |
 
-    Pinocchio computes an entry from two columns c = [z x d; z] at the world origin (`_PAIR_TERMS`):
+    Pinocchio computes an entry from two columns c = [z x d; z] at the world origin. `_CROSS_PRODUCT_COUNTS`
+    counts the products:
 
     | Step of Pinocchio | Products |
     |---|---|
@@ -601,19 +597,19 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    (near, near_mixed), (far, far_mixed) = _PAIR_TERMS[reference]
-    step, rate = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
-    turns, size_of = plan.columns[:, ColumnField.IS_ROTATION] == 1, np.abs(plan.multipliers)
+    (near, near_mixed), (far, far_mixed) = _CROSS_PRODUCT_COUNTS[reference]
+    step, v_index = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
+    is_rotation, multipliers = plan.columns[:, ColumnField.IS_ROTATION] == 1, np.abs(plan.multipliers)
     for f, (_, frame) in enumerate(plan.frames):
-        on_path = np.flatnonzero(plan.target_columns[f] >= 0)
-        i, j = on_path[:, np.newaxis], on_path[np.newaxis, :]
+        columns = np.flatnonzero(plan.target_columns[f] >= 0)
+        i, j = columns[:, np.newaxis], columns[np.newaxis, :]
         before = step[j] <= step[i]
-        sizes = product(size_of[i], size_of[j])
-        both, one = sizes * (turns[i] & turns[j]), sizes * (turns[i] ^ turns[j])
-        pair = frame, rate[i], rate[j]
-        np.add.at(turning, pair, both * np.where(before, near, far))
-        np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
-        np.add.at(angular, pair, both * (before != reference.own_axes))
+        sizes = product(multipliers[i], multipliers[j])
+        both, one = sizes * (is_rotation[i] & is_rotation[j]), sizes * (is_rotation[i] ^ is_rotation[j])
+        entry = frame, v_index[i], v_index[j]
+        np.add.at(turning, entry, both * np.where(before, near, far))
+        np.add.at(mixed, entry, one * np.where(before, near_mixed, far_mixed))
+        np.add.at(angular, entry, both * (before != reference.own_axes))
     linear = product(turning, magnitudes.p[..., np.newaxis, np.newaxis]) + mixed
     return _repeat_as_six_rows(linear, angular)
 
@@ -679,10 +675,8 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 
-def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return a limit for |qw|.
-
-    Below the limit, rounding can change the sign of qw.
+def sign_limit(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
+    """Return the limit of |qw| below which rounding can change the sign of qw.
 
     | | |
     |---|---|
@@ -690,20 +684,20 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     | limit, 1.5 k eps | 3 delta |
     | error of qw | at most 2.3 delta, below the limit |
     """
-    return 1.5 * EPS * result_k(bound, leading)
+    return 1.5 * EPS * broadcast_k(bound, shape)
 
 
 def singularity_margin(plan: CompiledTree) -> float:
     """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    margin = 4 * (error of a frame's rotation)
+    margin = 4 * (error of a frame's rotation, for a base without rotation)
     below the margin: no digit of the Euler angles is reliable
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
-def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Sum |multiplier| over the joints that move with the same joint velocity.
+def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
+    """Sum |multiplier| over the joints on each path that move with the same joint velocity.
 
     For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
@@ -724,7 +718,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
 
 def find_active_entries(
-    plan: CompiledTree, reference: Reference = _ALIGNED, *, root_at_origin: bool = True
+    plan: CompiledTree, reference: Reference = _LOCAL_WORLD_ALIGNED, *, root_at_origin: bool = True
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
@@ -739,10 +733,10 @@ def find_active_entries(
     Returns:
         (frames, 6, nv) bool array.
     """
-    found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
-    turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
+    is_active = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
+    is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     multipliers = plan.geometry[:, Geometry.MULTIPLIER :]
-    extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
+    extends = (plan.lengths[: len(is_revolute)] > 0.0) | (~is_revolute & (multipliers != 0.0).any(axis=1))
     for f, (end, frame) in enumerate(plan.frames):
         path, step = list[int](), int(end)
         while step >= 0:
@@ -751,11 +745,11 @@ def find_active_entries(
         if reference.at_world:
             levers = np.logical_or.accumulate([not root_at_origin, *extends[path[::-1]]])[:0:-1]
         else:
-            levers = np.logical_or.accumulate([plan.lengths[len(turns) + f] > 0.0, *extends[path[:-1]]])
+            levers = np.logical_or.accumulate([plan.lengths[len(is_revolute) + f] > 0.0, *extends[path[:-1]]])
         has_lever = dict(zip(path, levers, strict=False))
         for c in np.flatnonzero((plan.target_columns[f] >= 0) & (plan.multipliers != 0.0)):
             column = plan.columns[c]
-            rows = found[frame, :, column[ColumnField.V]]
+            rows = is_active[frame, :, column[ColumnField.V]]
             rows[:3] |= not column[ColumnField.IS_ROTATION] or has_lever[column[ColumnField.STEP]]
             rows[3:] |= column[ColumnField.IS_ROTATION] == 1
-    return found
+    return is_active

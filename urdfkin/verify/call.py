@@ -31,7 +31,7 @@ class CallPart(NamedTuple):
 
     Attributes:
         rates: (), (v,) or (v, a).
-        state: (n or 1, 24) base state.
+        state: (n or 1, 24) result of `BaseMotion.state`.
         query: Input of the oracle, converted independently.
     """
 
@@ -48,7 +48,10 @@ class Call:
     """The inputs of one call.
 
     Args:
-        also: Computed frames outside the result.
+        plan: Compiles the tree for link indices.
+        q_v_a: q, or q and v, or q, v and a.
+        additional_frames: Frames that the call computes, but that are not part of the result.
+        options: Arguments of a quantity, for example `gravity`.
     """
 
     def __init__(
@@ -58,16 +61,16 @@ class Call:
         frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
-        given: Sequence[ConfigurationLike],
-        also: Sequence[str] = (),
+        q_v_a: Sequence[ConfigurationLike],
+        additional_frames: Sequence[str] = (),
         **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base must be a BaseMotion or None", found=type(base).__name__)
-        named = [as_text_or_mapping(x, name) for x, name in zip(given, "qva", strict=False)]
+        named = [as_text_or_mapping(x, name) for x, name in zip(q_v_a, "qva", strict=False)]
         inputs: list[ArrayLike] = [
-            cast("ArrayLike", x) if by is None else parse_numbers(tree, by, name)
-            for x, by, name in zip(given, named, "qva", strict=False)
+            cast("ArrayLike", x) if by_name is None else parse_numbers(tree, by_name, name)
+            for x, by_name, name in zip(q_v_a, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
         self.is_list, self.frames = _parse_frames(frame)
@@ -75,16 +78,16 @@ class Call:
         self.query = OracleQuery(frame, reference, base, inputs, named, joints)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
-        self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
+        self.plan = plan((*self.links, *(tree.frame_link(name) for name in additional_frames)))
         arrays = [parse_and_normalise(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
-        self.shape = self._batch_shape(arrays)
+        self.shape = self._broadcast_batch_shapes(arrays)
         self.n = math.prod(self.shape)
-        flat = [self._flat_input(array) for array in arrays]
+        flat = [self._flatten_input(array) for array in arrays]
         self.q, *self.rates = flat
         self.state = FIXED_BASE_STATE if base is None else base.state(self.shape)
 
-    def _batch_shape(self, given: list[FloatArray]) -> tuple[int, ...]:
-        shapes = [array.shape[:-1] for array in given]
+    def _broadcast_batch_shapes(self, arrays: list[FloatArray]) -> tuple[int, ...]:
+        shapes = [array.shape[:-1] for array in arrays]
         if self.base is not None:
             shapes.append(self.base.batch_shape)
         if all(shape == shapes[0] for shape in shapes):
@@ -95,7 +98,7 @@ class Call:
             found = ", ".join(str(shape) for shape in shapes)
             raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
 
-    def _flat_input(self, array: FloatArray) -> FloatArray:
+    def _flatten_input(self, array: FloatArray) -> FloatArray:
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
@@ -110,23 +113,22 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError.
-        The subclass's `reshape` may return another shape.
-        With another shape, a kernel could write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError, because its `reshape` may return another
+        shape. A kernel could then write past the end of `out`.
         """
         if out is None:
             return None
-        wanted = (*self.shape, *((len(self.links),) if self.is_list else ()), *shape)
-        good = type(out) in _PLAIN_ARRAY_TYPES and out.dtype == np.float64 and out.flags.carray
-        if not good or out.shape != wanted:
+        expected_shape = (*self.shape, *((len(self.links),) if self.is_list else ()), *shape)
+        is_usable = type(out) in _PLAIN_ARRAY_TYPES and out.dtype == np.float64 and out.flags.carray
+        if not is_usable or out.shape != expected_shape:
             raise InputError(
-                f"out must be a writable C-contiguous float64 array of shape {wanted}",
+                f"out must be a writable C-contiguous float64 array of shape {expected_shape}",
                 found=_describe_array(out),
                 remedy="np.asarray(out) is a plain array"
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN_ARRAY_TYPES
                 else None,
             )
-        self.query.convert_inputs()
+        self.query.cache_inputs()
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError(
                 "out must not share memory with q, v or a, because the check reads the inputs again"
@@ -136,13 +138,10 @@ class Call:
     def restore_shape(self, result: FloatArray) -> FloatArray:
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
-    def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`.
-
-        The error about a non-finite input names the joint.
-        """
+    def run_and_locate_error(self, function: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Call `function`, and name the joint in the error about a non-finite input."""
         try:
-            return evaluate(*arguments, **options)
+            return function(*arguments, **options)
         except NotFiniteError:
             for x, name in zip(self.inputs, "qva", strict=False):
                 parse_finite(self.tree, x, name)
@@ -166,7 +165,7 @@ def _describe_array(out: object) -> str:
         "not C-contiguous": out.flags.c_contiguous,
         "not aligned": out.flags.aligned,
     }
-    faults = (fault for fault, good in flags.items() if not good)
+    faults = (fault for fault, is_good in flags.items() if not is_good)
     return ", ".join((f"{type(out).__name__} of {out.dtype} {out.shape}", *faults))
 
 

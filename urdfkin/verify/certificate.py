@@ -17,7 +17,7 @@ from urdfkin.system.documents import Count, DocumentKind, Header, NonNegativeFlo
 from urdfkin.system.files import expand_home, write_file
 from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.verify.comparison import BatchComparison
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import package_versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
@@ -39,7 +39,7 @@ class VerificationError(UrdfkinError):
         ours: urdfkin's result for the worst sample.
         theirs: The oracle's result for the worst sample.
         bound: Largest allowed difference of each number.
-        units: Largest difference, in multiples of eps * scale.
+        units: Largest difference, in multiples of eps * scale. The scale of an orientation is 1.
         reproduce: Shell command or line of Python that computes the sample again.
 
     >>> import urdfkin
@@ -152,7 +152,8 @@ class Certificate(Displayable):
         not_verified: Reasons why results were not checked; empty if every result was checked.
         source_notes: Text about the checked conversion of another format to URDF, and about locked joints.
             For a URDF without locked joints, the text is empty.
-        source: Source of the robot: a path, a catalogue name or "<text>".
+        source: Source of the robot: a path, a catalogue name, "-" for standard input, or a label such as
+            "<text>".
         sha256: SHA-256 digest of the MJCF or USD file, or of the URDF text in UTF-8.
         urdfkin: Version of urdfkin.
 
@@ -199,7 +200,7 @@ class Certificate(Displayable):
         """
         document = {
             "schema": CERTIFICATE.name,
-            "versions": versions() | ({"urdfkin": self.urdfkin} if self.urdfkin else {}),
+            "versions": package_versions() | ({"urdfkin": self.urdfkin} if self.urdfkin else {}),
             "sha256": [self.sha256 or None],
             "verdict": CERTIFICATE.verdicts[not self.verified],
             "command": None,
@@ -268,8 +269,8 @@ class Account:
     Attributes:
         unchecked: Unchecked results of calls with checks.
         disabled_checks: Results of calls with verify=False.
-        counters: Pairs (array, index), one for each prepared function with verify=False.
-            array[index] is the number of results that the function has returned.
+        counters: Pairs (array, index), one for each prepared function with verify=False. array[index] is the
+            number of results that the function has returned.
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
@@ -288,10 +289,7 @@ class Account:
 
 @dataclass
 class Ledger:
-    """Counts a robot's checked and unchecked results.
-
-    Several threads may use a ledger at once.
-    """
+    """Counts a robot's checked and unchecked results. Several threads may use a ledger at once."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
@@ -308,10 +306,7 @@ class Ledger:
             account.checked += comparison
 
     def count_unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count results without a check.
-
-        `reason` is None for calls with verify=False.
-        """
+        """Count unchecked results; `reason` is None for calls with verify=False."""
         account = self.account(quantity)
         with _ledger_lock:
             if reason is None:
@@ -323,8 +318,8 @@ class Ledger:
     def certificate(self, robot: str, oracle: str) -> Certificate:
         with _ledger_lock:
             accounts = {name: self._accounts[name] for name in QUANTITIES if name in self._accounts}
-            off = any(account.count_disabled_checks() for account in accounts.values())
-            reasons = (*([CHECK_DISABLED] if off else []), *self._reasons)
+            has_disabled_checks = any(account.count_disabled_checks() for account in accounts.values())
+            reasons = (*([CHECK_DISABLED] if has_disabled_checks else []), *self._reasons)
             lines = [account.line(name) for name, account in accounts.items()]
             return Certificate(
                 robot, oracle, tuple(line for line in lines if line.checked or line.unchecked), reasons

@@ -16,10 +16,10 @@ import numpy as np
 from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, SMALLEST_SUBNORMAL
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.bounds import KERNELS, Bound, result_k
+from urdfkin.verify.bounds import VERIFY_KERNELS_MODULE, Bound, broadcast_k
 
-#: Names of the kernels that check a single configuration.
-CHECK_KERNELS = "worst", "coupling"
+#: These kernels check a call with a single configuration.
+CHECK_KERNEL_NAMES = "worst", "coupling"
 _NO_BITS = np.empty(0, dtype=np.int64)
 
 
@@ -59,28 +59,29 @@ class BatchComparison:
         return self.bound_ratio <= 1.0
 
 
-def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
-    return compare_units(worst_disagreements(ours, theirs, bound.scale, axes), bound)
+def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, leading_axes: int) -> BatchComparison:
+    return compare_units(worst_disagreements(ours, theirs, bound.scale, leading_axes), bound)
 
 
 def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare the results' differences with the bound.
+    """Compare differences with the bound.
 
-    `units` contains the differences in multiples of eps * scale.
+    `units` contains the largest difference in each result, in multiples of eps * scale.
     """
     if not units.size:
         return BatchComparison()
-    share = units / result_k(bound, units.shape)
-    index = np.unravel_index(int(share.argmax()), share.shape)
-    return BatchComparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
+    bound_ratio = units / broadcast_k(bound, units.shape)
+    index = np.unravel_index(int(bound_ratio.argmax()), bound_ratio.shape)
+    return BatchComparison(
+        units.size, float(units.max()), float(bound_ratio.max()), tuple(int(i) for i in index)
+    )
 
 
 @np.errstate(all="ignore")
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The difference of unequal numbers is inf if the scale is 0.
-    The difference is also inf if a number or its scale is inf or NaN.
+    The result is inf for unequal numbers with a scale of 0, and if a number or its scale is inf or NaN.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, SMALLEST_SUBNORMAL), 0.0)
     difference = np.abs(ours - theirs)
@@ -88,42 +89,46 @@ def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> Flo
     return np.where(np.isfinite(difference) & np.isfinite(scale), units, np.inf)
 
 
-def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
+def worst_disagreements(
+    ours: FloatArray, theirs: FloatArray, scale: FloatArray, leading_axes: int
+) -> FloatArray:
     """Return the largest difference in each result, in multiples of eps * scale.
 
+    The first `leading_axes` axes of `ours` are the axes of the batch; each result has the other axes.
+
     Returns:
-        Array of shape `ours.shape[:axes]`.
+        Array of shape `ours.shape[:leading_axes]`.
     """
-    leading, own = ours.shape[:axes], ours.shape[axes:]
-    n, numbers = math.prod(leading), math.prod(own)
-    shared = axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
-    shape = (1, *ours.shape[1:]) if shared else ours.shape
-    one, other = _as_rows(ours, ours.shape, n, numbers), _as_rows(theirs, ours.shape, n, numbers)
-    size = _as_rows(scale, shape, math.prod(shape[:axes]), numbers)
-    if (kernel := preload.get_kernel("worst", module=KERNELS)) is None:
+    leading, own = ours.shape[:leading_axes], ours.shape[leading_axes:]
+    n, width = math.prod(leading), math.prod(own)
+    is_scale_shared = leading_axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
+    shape = (1, *ours.shape[1:]) if is_scale_shared else ours.shape
+    our_rows, their_rows = _as_rows(ours, ours.shape, n, width), _as_rows(theirs, ours.shape, n, width)
+    scale_rows = _as_rows(scale, shape, math.prod(shape[:leading_axes]), width)
+    if (kernel := preload.get_kernel("worst", module=VERIFY_KERNELS_MODULE)) is None:
         begin = time.thread_time()
-        scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
-        worst: FloatArray = disagreement(one, other, scale_of_each).max(axis=1, initial=0.0)
+        scale_of_each = scale_rows if len(scale_rows) == n else scale_rows[np.arange(n) % len(scale_rows)]
+        worst: FloatArray = disagreement(our_rows, their_rows, scale_of_each).max(axis=1, initial=0.0)
         preload.add_time("worst", time.thread_time() - begin)
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If `size` has fewer than n rows, the kernel uses these arrays as working memory.
-        if len(size) < n:
-            unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
+        # If `scale_rows` has fewer than n rows, the kernel uses these arrays as working memory.
+        if len(scale_rows) < n:
+            unit, units, out_bits = np.empty(scale_rows.size), np.zeros(width), worst.view(np.int64)
             bits = units.view(np.int64)
-        kernel(one, other, size, worst, out_bits, unit, units, bits)
+        kernel(our_rows, their_rows, scale_rows, worst, out_bits, unit, units, bits)
     return worst.reshape(leading)
 
 
-def _as_rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
+def _as_rows(x: FloatArray, shape: tuple[int, ...], n: int, width: int) -> FloatArray:
     if x.shape != shape:  # `broadcast_to` is slow.
         x = np.broadcast_to(x, shape)
-    return np.ascontiguousarray(x).reshape(n, numbers)
+    return np.ascontiguousarray(x).reshape(n, width)
 
 
 def load_kernels() -> None:
     """Compile or load all Numba kernels."""
     preload.load_all_kernels()
-    for name in (*CHECK_KERNELS, "lengths"):
-        preload.load_kernel(name, KERNELS)
+    for name in (*CHECK_KERNEL_NAMES, "lengths"):
+        preload.load_kernel(name, VERIFY_KERNELS_MODULE)

@@ -53,17 +53,17 @@ from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
-#: Number of random configurations besides the zero configuration.
+#: Number of random configurations. `check_model_source` also compares the neutral configuration.
 _SAMPLE_COUNT = 8
 #: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
 #: The error of each program is less than 8 eps.
 #: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
 #: Quaternions need a square root, a quotient and products of two numbers.
-_ROUNDINGS = 16.0
+_ORIENTATION_ROUNDINGS = 16.0
 
 
-def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Compare the frames of a chain with Pinocchio.
+def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | None:
+    """Compare the frames of a chain with Pinocchio's frames.
 
     | Frame of a joint | |
     |---|---|
@@ -82,47 +82,49 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     if verifier.find_refusal() is not None:
         return None
     tree = verifier.tree
-    names = [path.base, *(JointFrame.of(joint.name) for joint in path.joints), path.tip]
+    names = [chain.base, *(JointFrame.of(joint.name) for joint in chain.joints), chain.tip]
     theirs = verifier.oracle().placements(QueryBatch(names, (q,)))
     base, theirs = theirs[:, :1], theirs[:, 1:]
-    coordinates = path.coupling.select(tree, q)
-    values, ours = path.coupling.values(coordinates), base @ path.frames(coordinates)
+    coordinates = chain.coupling.select(tree, q)
+    values, ours = chain.coupling.values(coordinates), base @ chain.frames(coordinates)
     expected = theirs.copy()
-    for i, joint in enumerate(path.joints):
+    for i, joint in enumerate(chain.joints):
         axis = tree.joints[tree.joint_index(joint.name)].axis
         expected[:, i, :3, 2] = theirs[:, i, :3, :3] @ (-axis if joint.backwards else axis)
         if not joint.backwards and not joint.kind.turns:
             expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
-    off = np.abs(ours - expected)[:, :, :3]
-    metres = float(off[..., 3].max(initial=0.0))
-    turned = max(float(off[..., 2].max(initial=0.0)), float(off[:, -1, :, :3].max(initial=0.0)))
-    ends = [i for end in (path.base, path.tip) for i in tree.path(tree.frame_link(end))]
-    unit = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].pinocchio_tilt for i in ends)))
-    length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
-    slides = values[:, [not joint.kind.turns for joint in path.joints]]
-    length += np.abs(slides).sum(axis=-1).max(initial=0.0)
-    share = max(metres / (unit * length + SMALLEST_SUBNORMAL), turned / unit)
-    if share > 1.0:
+    differences = np.abs(ours - expected)[:, :, :3]
+    # `np.maximum` and `not ... <= 1` treat NaN as a disagreement.
+    metres = differences[..., 3].max(initial=0.0)
+    direction = np.maximum(differences[..., 2].max(initial=0.0), differences[:, -1, :, :3].max(initial=0.0))
+    ends = [i for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
+    rounding = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].pinocchio_tilt for i in ends)))
+    length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + chain.lengths.sum()
+    displacements = values[:, [not joint.kind.turns for joint in chain.joints]]
+    length += np.abs(displacements).sum(axis=-1).max(initial=0.0)
+    bound_ratio = np.maximum(metres / (rounding * length + SMALLEST_SUBNORMAL), direction / rounding)
+    if not bound_ratio <= 1.0:
         raise TableError(
             "the chain's axes disagree with Pinocchio's",
-            where=f"{path.robot}, {path.base} to {path.tip}",
-            found=f"an origin {metres:.3g} m off, a direction {turned:.3g}",
+            where=f"{chain.robot}, {chain.base} to {chain.tip}",
+            found=f"an origin {metres:.3g} m off, a direction {direction:.3g}",
             remedy="please report this as an error of urdfkin, with the URDF",
         )
     return (
-        f"origins of {len(path.joints)} joints and the tip within {metres:.2e} m ({share:.0%} of the bound)"
+        f"origins of {len(chain.joints)} joints and the tip within {metres:.2e} m"
+        f" ({bound_ratio:.0%} of the bound)"
     )
 
 
-def check_opw(verifier: Verifier, path: FrameChain, found: OpwParameters) -> str | None:
+def check_opw(verifier: Verifier, chain: FrameChain, opw: OpwParameters) -> str | None:
     if verifier.find_refusal() is not None:
         return None
-    q, base, tip = _sample_base_and_tip(verifier, path.base, path.tip)
-    values = path.coupling.values(path.coupling.select(verifier.tree, q))
-    off = np.abs(base @ found.placement(values) - tip)[:, :3]
+    q, base, tip = _sample_base_and_tip(verifier, chain.base, chain.tip)
+    values = chain.coupling.values(chain.coupling.select(verifier.tree, q))
+    differences = np.abs(base @ opw.placement(values) - tip)[:, :3]
     return (
         "the OPW solver's tip pose base . F(sign q - offset) . tool differs from Pinocchio by at most"
-        f" {off[..., 3].max():.2e} m and {off[..., :3].max():.2e} rad on {len(q)} samples"
+        f" {differences[..., 3].max():.2e} m and {differences[..., :3].max():.2e} rad on {len(q)} samples"
     )
 
 
@@ -131,78 +133,77 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
         return None
     q, base, tip = _sample_base_and_tip(verifier, screws.base_frame, screws.tip_frame)
     coordinates = screws.coupling.select(verifier.tree, q)
-    size = np.abs(coordinates).sum(axis=-1)
-    off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
-    path = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the placements of the base and the tip relative to the root.
-    # The product of exponentials is the placement of the tip relative to the base.
-    lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
-    joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
-    unit = EPS * (joint_roundings(joints) + size) + sum_zeroed_tilts(path)
-    allowed = screws.rounding(coordinates) + unit * (lever + size)
-    share = float((off[..., 3].max(axis=-1) / (allowed + SMALLEST_SUBNORMAL)).max(initial=0.0))
-    turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
-    if not max(share, turn) <= 1.0:
+    coordinate_sum = np.abs(coordinates).sum(axis=-1)
+    differences = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
+    chain = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
+    # Pinocchio computes the placements of the base and the tip relative to the root. The product of
+    # exponentials is the placement of the tip relative to the base.
+    lever = np.linalg.norm(base[:, :3, 3], axis=-1) + chain.reach + float(chain.lengths[0])
+    joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (chain.base, chain.tip))
+    rounding = EPS * (joint_roundings(joints) + coordinate_sum) + sum_zeroed_tilts(chain)
+    allowed = screws.rounding(coordinates) + rounding * (lever + coordinate_sum)
+    position_ratio = (differences[..., 3].max(axis=-1) / (allowed + SMALLEST_SUBNORMAL)).max(initial=0.0)
+    rotation_ratio = (differences[..., :3].max(axis=(-1, -2)) / (rounding + EPS * screws.roundings)).max()
+    bound_ratio = np.maximum(position_ratio, rotation_ratio)  # NaN is a disagreement.
+    if not bound_ratio <= 1.0:
         raise TableError(
             "the product of exponentials disagrees with Pinocchio",
             where=f"{screws.robot}, {screws.base_frame} to {screws.tip_frame}",
-            found=f"a tip {off[..., 3].max():.3g} m off",
+            found=f"a tip {differences[..., 3].max():.3g} m off",
             remedy="please report this as an error of urdfkin, with the URDF",
         )
     return (
-        f"agrees within rounding on {len(q)} samples: tip within {off[..., 3].max():.2e} m"
-        f" ({max(share, turn):.0%} of the bound)"
+        f"agrees within rounding on {len(q)} samples: tip within {differences[..., 3].max():.2e} m"
+        f" ({bound_ratio:.0%} of the bound)"
     )
 
 
 def _sample_base_and_tip(
     verifier: Verifier, base: str, tip: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compute placements at random configurations with Pinocchio.
-
-    Returns:
-        q (n, nq), and base and tip (n, 4, 4).
-    """
+    """Return random q (n, nq), and Pinocchio's placements (n, 4, 4) of the base and of the tip."""
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
     T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
     return q, T[:, 0], T[:, 1]
 
 
-def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
+def check_orientations(
+    orientations: FloatArray, R: FloatArray, frame: str, make_command: Callable[[int], str]
+) -> None:
     """Compare Pinocchio's rotations with verified rotations.
 
     Rotation matrices are unique; angles at gimbal lock and signs of quaternions are not. The bound includes
     the rounding errors of `R`.
 
-    `numbers` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last. `again(k)` returns
-    a command that computes sample k again.
+    `orientations` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
+    `make_command(k)` returns a command that computes sample k again.
     """
     pin = pinocchio()
-    if numbers.shape[-1] == 3:
-        theirs = np.array([pin.rpy.rpyToMatrix(*row) for row in numbers.tolist()])
+    if orientations.shape[-1] == 3:
+        theirs = np.array([pin.rpy.rpyToMatrix(*row) for row in orientations.tolist()])
     else:
-        theirs = np.array([pin.Quaternion(row).toRotationMatrix() for row in numbers])
+        theirs = np.array([pin.Quaternion(row).toRotationMatrix() for row in orientations])
     theirs = theirs.reshape(-1, 3, 3)
     defect = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).sum(axis=(-1, -2))
-    bound = _ROUNDINGS * EPS + 2.0 * defect
-    off = np.abs(theirs - R).max(axis=(-1, -2))
-    if (off <= bound).all():
+    bound = _ORIENTATION_ROUNDINGS * EPS + 2.0 * defect
+    differences = np.abs(theirs - R).max(axis=(-1, -2))
+    if (differences <= bound).all():
         return
-    k = int(np.argmax(off / bound))
+    k = int(np.argmax(differences / bound))
     raise VerificationError(
         "orientation",
         frame,
-        "rpy" if numbers.shape[-1] == 3 else "quaternion",
+        "rpy" if orientations.shape[-1] == 3 else "quaternion",
         index=(k,),
         ours=R[k],
         theirs=theirs[k],
         bound=np.full((3, 3), bound[k]),
-        units=float(off[k] / EPS),
-        reproduce=again(k),
+        units=float(differences[k] / EPS),
+        reproduce=make_command(k),
     )
 
 
-def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) -> str:
+def check_model_source(verifier: Verifier, converted: ConvertedModel, source: Any) -> str:
     """Compare a robot with its source model.
 
     `source` is a pinocchio.Model or a RobotWrapper.
@@ -211,10 +212,10 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     if model.nv > MAX_NV:  # Pinocchio's memory grows with the cube of nv.
         return f"not compared with the model itself: nv is {model.nv}, more than {MAX_NV}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLE_COUNT, np.random.default_rng(0))))
-    names = [*made.joints, *made.frames]
+    names = [*converted.joints, *converted.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
-    theirs = _model_placements(model, _model_configurations(model, tree, q), made)
+    theirs = _compute_model_placements(model, _convert_configurations(model, tree, q), converted)
     # The factor 2 allows for rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
@@ -231,26 +232,22 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     )
 
 
-def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
-    """Return the placements of joints, then of frames."""
+def _compute_model_placements(model: Any, q: FloatArray, converted: ConvertedModel) -> FloatArray:
+    """Return the placements of `converted.joints`, then of `converted.frames`."""
     pin = pinocchio()
     data = model.createData()
-    out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
+    out = np.empty((len(q), len(converted.joints) + len(converted.frames), 4, 4))
     for k, q_k in enumerate(q):
         pin.framesForwardKinematics(model, data, q_k)
-        placed = [data.oMi[j] for j in made.joints.values()] + [data.oMf[i] for i in made.frames.values()]
+        placed = [data.oMi[j] for j in converted.joints.values()] + [
+            data.oMf[i] for i in converted.frames.values()
+        ]
         out[k] = [one.homogeneous for one in placed]
     return out
 
 
-def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert q of urdfkin's tree to q of the `pinocchio.Model`.
-
-    Joints are matched by name.
-
-    Returns:
-        (n, model.nq) configurations.
-    """
+def _convert_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
+    """Convert q of urdfkin's tree to q (n, model.nq) of the `pinocchio.Model`; joint names are equal."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
@@ -272,18 +269,18 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     q = sample(verifier.tree, _SAMPLE_COUNT, np.random.default_rng(0))
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
-    off = np.abs(theirs - table.placement(own))[:, :3]
-    # The rotation matrices of the table's base and tool may be rounded to six digits.
-    # The URDF contains exact rotations.
-    # The bound therefore includes the deviation of the table's matrices from rotation matrices.
+    differences = np.abs(theirs - table.placement(own))[:, :3]
+    # The rotation matrices of the table's base and tool may be rounded to six digits, but the URDF contains
+    # exact rotations. The bound therefore includes the deviation of these matrices from rotation matrices.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * written_urdf_roundings(rows) + defect
     allowed = metres * (written_urdf_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
-    if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
+    # A comparison with NaN is False, so NaN is a disagreement.
+    if not ((differences[..., 3].max(axis=-1) <= allowed).all() and (differences[..., :3] <= turn).all()):
         raise TableError(
             "the URDF made from a table differs from the table",
             where=table.robot,
-            found=f"a tip {off[..., 3].max():.3g} m off",
+            found=f"a tip {differences[..., 3].max():.3g} m off",
             remedy="please report this as an error of urdfkin, with the table",
         )
 

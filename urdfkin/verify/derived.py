@@ -1,4 +1,4 @@
-"""Check quantities that are computed from several results of an oracle.
+"""Derive expected results, and their bounds, from several results of an oracle.
 
 | Quantity | Results of the oracle |
 |---|---|
@@ -6,9 +6,9 @@
 | relative placement | placements of both frames in the world |
 | IMU reading | acceleration, placement and velocity |
 
-urdfkin includes gravity in an IMU reading as an acceleration of the base. `check_imu` subtracts gravity from
-the oracle's result, in the sensor's axes. A wrong sign of gravity, or a wrong order of the steps, therefore
-causes a disagreement.
+urdfkin includes gravity in an IMU reading as an acceleration of the base. `derive_imu_reading` subtracts
+gravity from the oracle's result, in the sensor's axes. A wrong sign of gravity, or a wrong order of the
+steps, therefore causes a disagreement.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import OracleLibrary
 
 
-def check_analytical_jacobian(
+def derive_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's analytical Jacobians with a bound.
@@ -56,7 +56,7 @@ def check_analytical_jacobian(
     return theirs, bounds.euler_jacobian_bound(bound, magnitudes, axis_sine)
 
 
-def check_relative_placement(
+def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's relative placements with a bound.
@@ -87,7 +87,7 @@ def check_relative_placement(
     return theirs, Bound(world.scale[:, :-1], world.k[:, :-1] + 2.0 * world.k[:, -1:])
 
 
-def check_imu(
+def derive_imu_reading(
     oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's IMU readings with a bound."""

@@ -61,11 +61,7 @@ def _in_eps_scale(difference, size):
 
 @inline_function(fastmath={"nnan", "nsz"})
 def _largest_difference(ours, theirs, scale, i, k):
-    """Compare two rows of finite numbers.
-
-    Returns:
-        Largest |ours[i, j] - theirs[i, j]| of all j, in units of eps * scale[k, j].
-    """
+    """Return the largest |ours[i, j] - theirs[i, j]| of finite numbers, in units of eps * scale[k, j]."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _in_eps_scale(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -74,7 +70,7 @@ def _largest_difference(ours, theirs, scale, i, k):
 
 @inline_function()
 def _has_equal_triples(scale, k):
-    """Return whether x, y and z have equal scales."""
+    """Return True if scale[k] contains six rows: first three equal rows, then three equal rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -85,7 +81,7 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Compare the rows x, y and z, which have equal scales.
+    """Compare three rows (x, y, z) with equal scales.
 
     units[j] = (largest |ours - theirs| of x, y and z in column j) / unit[j]
     units[j] may be NaN or inf
@@ -102,11 +98,7 @@ def _divide_triples(ours, theirs, unit, width, units):
 
 @inline_function()
 def _largest_bits(x, count):
-    """Return the largest double's bit pattern.
-
-    For x, y >= 0, x < y if bits(x) < bits(y).
-    Some processors set the sign bit of NaN.
-    """
+    """For doubles x, y >= 0: x < y if bits(x) < bits(y). Some processors set the sign bit of NaN."""
     most = 0
     for j in range(count):
         most = max(most, x[j] & _MASK_WITHOUT_SIGN)
@@ -129,32 +121,32 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     The compiler can vectorize the maximum of integers, but not of doubles.
 
     - `scale`: the rows repeat if `scale` is shorter than `out`
-    - `out`: largest difference in each row, in units of eps * scale; inf for inf or NaN
+    - `out`: largest difference in each row, in units of eps * scale; inf if a number or a scale is inf or NaN
     - `unit`, `units`: working memory, as large as `scale` and as one row of `scale`;
       used only if the rows repeat
     - `out_bits`, `bits`: views of `out` and `units` as integers
     """
-    known = in_triples = len(scale) < len(out)
+    is_known_finite = has_triples = len(scale) < len(out)
     for k in range(len(scale)):
-        known = known and _is_finite(scale, k)
-        in_triples = in_triples and _has_equal_triples(scale, k)
-    in_triples = in_triples and known
+        is_known_finite = is_known_finite and _is_finite(scale, k)
+        has_triples = has_triples and _has_equal_triples(scale, k)
+    has_triples = has_triples and is_known_finite
     width, address = ours.shape[1] // 6, doubles_at(ours.ctypes.data)
     numbers = 6 * width
-    if in_triples:
+    if has_triples:
         for k in range(len(scale)):
             for j in range(numbers):
                 size = scale[k, j]
                 unit[k * numbers + j] = max(EPS * size, SMALLEST_SUBNORMAL) if size > 0.0 else 0.0
     for i in range(len(out)):
         k = i % len(scale)
-        if in_triples:
+        if has_triples:
             prefetch(address, min(i + _PREFETCH_DISTANCE, len(out) - 1) * numbers, numbers)
             for first in (0, 3 * width):
                 rows, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
                 _divide_triples(ours[i, rows], theirs[i, rows], of_scale, width, units[first // 3 :])
             out_bits[i] = min(_largest_bits(bits, 2 * width), _INFINITY_BITS)
-        elif not (_is_difference_finite(ours, theirs, i) and (known or _is_finite(scale, k))):
+        elif not (_is_difference_finite(ours, theirs, i) and (is_known_finite or _is_finite(scale, k))):
             out[i] = math.inf
         else:
             out[i] = _largest_difference(ours, theirs, scale, i, k)
@@ -163,7 +155,10 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 
 @kernel(FLOATS_2D, INTS_1D, INTS_1D, FLOATS_1D, WRITABLE_FLOATS_1D)
 def coupling(full, columns, index, factor, out):
-    """Add weighted Jacobian columns to `out`."""
+    """Add Jacobian columns of mimic joints: column i of `full`, times factor[i], to column index[i] of `out`.
+
+    `out` contains the rows of the sum, one after the other.
+    """
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):
         for column in columns:
@@ -226,33 +221,30 @@ def _read_row(x, row, at):
 
 
 @inline_function()
-def _write_scaled(x, first, m, at, factor, to):
-    """Write scaled absolute values to `to`.
-
-    A single row is repeated.
-    """
+def _write_scaled(x, first, count, at, factor, to):
+    """Write factor * |x| to `to`. If x has one row, this row is used for all configurations."""
     step = 1 if len(x) > 1 else 0
-    for i in range(m):
+    for i in range(count):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))
 
 
 @inline_function()
-def _propagate_over_revolute(before, after, m, d, rates):
-    for i in range(m):
+def _propagate_over_revolute(before, after, count, d, rates):
+    for i in range(count):
         _write_state(after, i, _after_revolute(_read_state(before, i), d, rates[0, i], rates[1, i]))
 
 
 @inline_function()
-def _propagate_over_prismatic(before, after, m, d, constant, rates):
-    for i in range(m):
-        length = d + (rates[2, i] + constant)
+def _propagate_over_prismatic(before, after, count, d, offset, rates):
+    for i in range(count):
+        length = d + (rates[2, i] + offset)
         _write_state(after, i, _after_prismatic(_read_state(before, i), length, rates[0, i], rates[1, i]))
 
 
 @inline_function()
-def _propagate_over_free(before, after, first, m, d, free, at):
+def _propagate_over_free(before, after, first, count, d, free, at):
     step = 1 if len(free) > 1 else 0
-    for i in range(m):
+    for i in range(count):
         displacement, o, u, o_rate, u_rate = _read_row(free, (first + i) * step, at)
         _write_state(
             after, i, _after_free_joint(_read_state(before, i), d + displacement, o, u, o_rate, u_rate)
@@ -272,46 +264,46 @@ def _propagate_over_free(before, after, first, m, d, free, at):
     WRITABLE_FLOATS_3D,
     WRITABLE_FLOATS_1D,
 )
-def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
+def lengths(joints, joint_numbers, ends, tip_lengths, q, v, a, free, base, states, out):
     """Compute the lengths of all frames.
 
     Each of the arrays q, v, a, free and base has one row or n rows.
 
-    - `links`: kind, index in q, index in v, previous moving joint
-    - `sizes`: length from the previous moving joint, mimic multiplier, offset
+    - `joints`: kind, index in q, index in v, previous moving joint
+    - `joint_numbers`: length from the previous moving joint, mimic multiplier, offset
     - `ends`: last moving joint before the frame, index in `out`
-    - `tips`: length from the last moving joint
+    - `tip_lengths`: length from the last moving joint
     - `free`: lengths from `urdfkin.verify.bounds._free_lengths`
-    - `s`: working memory for a block: base, moving joints, one more state
+    - `states`: working memory for a block: base, moving joints, one more state
     - `out`: `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes`
     """
-    frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
+    frames, block, rates = len(ends), states.shape[2], states[len(joints) + 1]
     n = len(out) // max(1, _STATE_SIZE * frames)
     for first in range(0, n, block):
-        m, found = min(block, n - first), 0
-        start, step = s[0], 1 if len(base) > 1 else 0
-        for i in range(m):
+        count, free_column = min(block, n - first), 0
+        start, step = states[0], 1 if len(base) > 1 else 0
+        for i in range(count):
             _write_state(start, i, _read_row(base, (first + i) * step, 0))
-        for k in range(len(links)):
-            kind, at, parent = links[k, 0], links[k, 2], links[k, 3]
-            d, multiplier = sizes[k, 0], sizes[k, 1]
-            before, after = s[parent + 1], s[k + 1]
+        for k in range(len(joints)):
+            kind, at, parent = joints[k, 0], joints[k, 2], joints[k, 3]
+            d, multiplier = joint_numbers[k, 0], joint_numbers[k, 1]
+            before, after = states[parent + 1], states[k + 1]
             if kind > _SLIDE:
-                _propagate_over_free(before, after, first, m, d, free, found)
-                found += _FREE_SIZE
+                _propagate_over_free(before, after, first, count, d, free, free_column)
+                free_column += _FREE_SIZE
             else:
-                _write_scaled(v, first, m, at, multiplier, rates[0])
-                _write_scaled(a, first, m, at, multiplier, rates[1])
+                _write_scaled(v, first, count, at, multiplier, rates[0])
+                _write_scaled(a, first, count, at, multiplier, rates[1])
                 if kind == _TURN:
-                    _propagate_over_revolute(before, after, m, d, rates)
+                    _propagate_over_revolute(before, after, count, d, rates)
                 else:
-                    _write_scaled(q, first, m, links[k, 1], multiplier, rates[2])
-                    _propagate_over_prismatic(before, after, m, d, sizes[k, 2], rates)
+                    _write_scaled(q, first, count, joints[k, 1], multiplier, rates[2])
+                    _propagate_over_prismatic(before, after, count, d, joint_numbers[k, 2], rates)
         for f in range(frames):
-            before = s[ends[f, 0] + 1]
-            for i in range(m):
+            before = states[ends[f, 0] + 1]
+            for i in range(count):
                 at = (first + i) * frames + ends[f, 1]
-                state = _translate_point(_read_state(before, i), tips[f])
+                state = _translate_point(_read_state(before, i), tip_lengths[f])
                 for j in range(_STATE_SIZE):
                     out[j * n * frames + at] = state[j]
     return 0

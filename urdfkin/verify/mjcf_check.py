@@ -31,7 +31,13 @@ from urdfkin.system.files import expand_home
 from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.mjcf import MjcfRemark, is_text, source_name
 from urdfkin.urdf.mujoco import version
-from urdfkin.verify.bounds import Bound, compute_magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
+from urdfkin.verify.bounds import (
+    Bound,
+    broadcast_k,
+    compute_magnitudes,
+    mjcf_placement_bound,
+    mujoco_magnitudes,
+)
 from urdfkin.verify.comparison import worst_disagreements
 from urdfkin.verify.mjcf_process import MAX_OUTPUT_BYTES, parse_answers, unpack_array
 from urdfkin.verify.quantities import PLACEMENT
@@ -205,7 +211,7 @@ def _unpack_placements(found: Mapping[str, Any]) -> FloatArray:
 
 def _compute_bound_ratios(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
     units = worst_disagreements(ours, theirs, bound.scale, 2)
-    ratio: FloatArray = units / result_k(bound, units.shape)
+    ratio: FloatArray = units / broadcast_k(bound, units.shape)
     return ratio
 
 

@@ -10,7 +10,7 @@ module changes the text before MuJoCo reads it:
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
   body to the world. A planar joint becomes two slide joints and a hinge.
 - Mimic rules are removed. MuJoCo would convert mimic rules to constraints, and MuJoCo's kinematics ignores
-  constraints. This module computes the values of mimic joints with the rules from `rules_of_text`.
+  constraints. This module computes the values of mimic joints with the rules from `parse_mimic_rules`.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
@@ -40,8 +40,8 @@ from urdfkin.verify.oracle import (
     Oracle,
     QueryBatch,
     find_locked_values,
-    mimic_rules,
     nearest_quaternion,
+    read_mimic_rules,
 )
 from urdfkin.verify.pinocchio import tree_depth
 
@@ -110,9 +110,9 @@ class MujocoOracle(Oracle):
         except (ValueError, KeyError, ExpatError) as error:
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
-        lock_mimic_joints = mimic_rules(text, moving, tree.name) if self.mimic else {}
+        lock_mimic_joints = read_mimic_rules(text, moving, tree.name) if self.mimic else {}
         locked = find_locked_values(self.lock, lock_mimic_joints)  # Locked joints stay in MuJoCo's model.
-        rules = self.read_rules([name for name in moving if name not in locked])
+        rules = self.read_and_check_rules([name for name in moving if name not in locked])
         base = [_Joint("", "floating", "", links[0])] if self.moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if base else []), *links])}
         self._model = self._compile_model([*base, *joints], links[0])

@@ -7,17 +7,17 @@ conversion therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
-| mimic rules | `rules_of_text` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
+| mimic rules | `parse_mimic_rules` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
 | names, batch shapes | `OracleQuery` | `urdfkin.verify.call` |
 | order of q, v and a | `PinocchioLayout` | `KinematicTree` |
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
-| moving base | `free_flyer` and others | `BaseMotion` |
+| moving base | `free_flyer_q` and others | `BaseMotion` |
 
 Mimic rules: Pinocchio's model is built without mimic joints (`urdfkin.verify.pinocchio`). This module
 therefore reads the mimic rules from the URDF text.
 
-Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
-planar joint three, a floating joint seven, and a mimic joint none.
+Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one
+number, a planar joint three, a floating joint seven, and a mimic joint none.
 
 Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the nearest
 rotation to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
@@ -47,13 +47,15 @@ from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
 from urdfkin.system.plain_xml import parse_xml
-from urdfkin.verify.bounds import KERNELS
+from urdfkin.verify.bounds import VERIFY_KERNELS_MODULE
 
 
-def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Read the mimic rules of `joints`.
+def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
+    """Read the mimic rules of `joints`. The returned rules refer to independent joints.
 
-    All rules refer to independent joints.
+    Raises:
+        ValueError: a multiplier or an offset is not a number.
+        ExpatError: the text is not valid XML.
     """
     if "mimic" not in text:
         return {}
@@ -92,18 +94,18 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
     >>> find_locked_values({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
     """
-    moved = {
+    mimic_values = {
         name: rule.multiplier * lock[rule.mimicked_joint] + rule.offset
         for name, rule in rules.items()
         if rule.mimicked_joint in lock
     }
-    return {**lock, **moved}
+    return {**lock, **mimic_values}
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-#: For example, a planar joint has nq = 4 in Pinocchio, and nq = 3 in urdfkin.
-_COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
+#: nq of a joint in urdfkin, by the joint's (nq, nv) in Pinocchio.
+_URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
@@ -129,6 +131,10 @@ class _JointIndices(NamedTuple):
 class PinocchioLayout:
     """Converts between Pinocchio's and urdfkin's layouts.
 
+    Args:
+        joints: Pinocchio's indices of the moving joints, without the base.
+        names: Names of these joints in the URDF.
+
     Attributes:
         rate_columns: Column indices of moving joints in Pinocchio's Jacobian, mimic joints included.
     """
@@ -142,7 +148,7 @@ class PinocchioLayout:
         for name, size in zip(names, sizes, strict=True):
             if name not in rules:
                 at[name] = self.nq, self.nv
-                self.nq, self.nv = self.nq + _COORDINATE_COUNTS[size], self.nv + size[1]
+                self.nq, self.nv = self.nq + _URDFKIN_NQ[size], self.nv + size[1]
         self._joints = list[_JointIndices]()
         for j, name, size in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
@@ -165,9 +171,8 @@ class PinocchioLayout:
                 self._factor[joint.full_v + c] = joint.multiplier
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
-        self._single, self._angles = (self._select_by_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: `_same_q` is True if Pinocchio can use q without conversion.
-        #: `_same_v` is True if Pinocchio can use v without conversion.
+        self._single, self._angles = (self._collect_arrays(sizes) for sizes in ((1, 1), _CONTINUOUS))
+        #: True if Pinocchio can use q (`_same_q`) or v (`_same_v`) without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -175,7 +180,7 @@ class PinocchioLayout:
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
-    def _select_by_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    def _collect_arrays(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
             np.array([joint.full_q for joint in joints], dtype=np.int64),
@@ -223,7 +228,7 @@ class PinocchioLayout:
 
 #: Name that Pinocchio gives to the world. The world is the parent of a root joint.
 WORLD = "universe"
-_PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
+_PREFIX_PATTERN = re.compile(r"(link|joint):(.*)", re.DOTALL)
 
 
 class Frames:
@@ -254,29 +259,26 @@ class Frames:
             return self._find_index(self._joints, name, str(name)[6:])
         body, joint = self._bodies.get(name), self._joints.get(name)
         if body is not None and joint is not None and self._parents.get(body, body) != joint:
-            raise self._error(f"two of {self._oracle}'s frames have this name", name)
+            raise self._make_error(f"two of {self._oracle}'s frames have this name", name)
         if body is not None:
             return body
         if joint is not None:
             return joint
-        if (parts := _PREFIXED.fullmatch(name)) is None:
-            raise self._error(f"{self._oracle} has no such frame", name)
+        if (parts := _PREFIX_PATTERN.fullmatch(name)) is None:
+            raise self._make_error(f"{self._oracle} has no such frame", name)
         return self._find_index(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
     def _find_index(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
         if (index := frames.get(plain_name)) is None:
-            raise self._error(f"{self._oracle} has no such frame", name)
+            raise self._make_error(f"{self._oracle} has no such frame", name)
         return index
 
-    def _error(self, what: str, name: str) -> OracleError:
-        return OracleError(what, where=self._robot, found=repr(str(name)))
+    def _make_error(self, message: str, name: str) -> OracleError:
+        return OracleError(message, where=self._robot, found=repr(str(name)))
 
 
 def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Frames:
-    """List a Pinocchio model's frames.
-
-    If `includes_world` is True, Pinocchio's world is the link `WORLD`.
-    """
+    """List a Pinocchio model's frames. If `includes_world` is True, Pinocchio's world is the link `WORLD`."""
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
@@ -287,7 +289,7 @@ def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Fram
     return Frames("Pinocchio", str(model.name), bodies, joints, parents)
 
 
-class BaseNumbers(Protocol):
+class BaseMotionLike(Protocol):
     """The user's motion of the base.
 
     Leading axes are batch axes.
@@ -306,32 +308,29 @@ class BaseNumbers(Protocol):
         """(..., 6) classical acceleration, [linear; angular] in world axes."""
 
 
-def free_flyer(base: BaseNumbers) -> FloatArray:
+def free_flyer_q(base: BaseMotionLike) -> FloatArray:
     """Return x, y, z, qx, qy, qz, qw of the base."""
     T = np.asarray(base.placement)
     return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
 
 
-def free_flyer_velocity(base: BaseNumbers) -> FloatArray:
+def free_flyer_velocity(base: BaseMotionLike) -> FloatArray:
     """Return the base's velocity in the base's axes."""
-    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
+    return _rotate_to_base_axes(free_flyer_q(base)[..., 3:], np.asarray(base.velocity))
 
 
-def free_flyer_acceleration(base: BaseNumbers) -> FloatArray:
+def free_flyer_acceleration(base: BaseMotionLike) -> FloatArray:
     """Return the base's spatial acceleration in the base's axes.
 
     The linear part is acc - w x vel.
     """
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
-    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
+    return _rotate_to_base_axes(free_flyer_q(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
-    """Return the unit quaternion of the nearest rotation.
-
-    The scalar is the last component.
-    """
+    """Return the unit quaternion, scalar last, of the rotation nearest to M (q-method, see the module)."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Because of rounding, the computed q has small components along the other eigenvectors of K.
@@ -373,8 +372,7 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Suffixes of coordinate names, by the number of joint velocities.
-#: A planar joint has three joint velocities, a floating joint six.
+#: Suffixes of coordinate names, by the number of joint velocities: planar joint 3, floating joint 6.
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 #: Suffixes of velocity names, by the number of joint velocities.
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
@@ -446,20 +444,19 @@ class BaseRows(NamedTuple):
 class QueryBatch(NamedTuple):
     """The arguments of an oracle for n configurations.
 
-    Pinocchio's functions for one and for several frames may round differently.
-
     Attributes:
         frames_are_joints: If True, `frames` contains `JointFrame` objects.
             Pinocchio uses its functions for joints, such as `getJointJacobian`.
-        is_partial: If True, Pinocchio uses its function for several frames even for one frame.
+        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with its functions
+            for several frames, which may round differently.
     """
 
     frames: Sequence[str]
     inputs: tuple[FloatArray, ...]
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
-    base: BaseNumbers | None = None
+    base: BaseMotionLike | None = None
     frames_are_joints: bool = False
-    is_partial: bool = False
+    uses_multi_frame_functions: bool = False
 
     @property
     def q(self) -> FloatArray:
@@ -486,7 +483,7 @@ class OracleQuery:
         self,
         frame: str | Sequence[str],
         reference: Reference | str,
-        base: BaseNumbers | None,
+        base: BaseMotionLike | None,
         inputs: Sequence[ArrayLike],
         named_inputs: Sequence[str | Mapping[str, ArrayLike] | None] = (),
         joints: Sequence[tuple[str, int]] = (),
@@ -496,11 +493,8 @@ class OracleQuery:
         self.reference, self.base = reference, base
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
-    def convert_inputs(self) -> None:
-        """Convert the inputs before `out` changes.
-
-        An array in a mapping may share memory with `out`.
-        """
+    def cache_inputs(self) -> None:
+        """Convert and store the inputs before `out` changes: an array in a mapping may share its memory."""
         _ = self._inputs
 
     @cached_property
@@ -517,12 +511,12 @@ class OracleQuery:
     def _set_named_values(
         self,
         x: FloatArray,
-        named_inputs: str | Mapping[str, ArrayLike],
+        named_values: str | Mapping[str, ArrayLike],
         suffixes: Mapping[int, tuple[str, ...]],
     ) -> FloatArray:
         names = _CoordinateNames(self._joints, suffixes)
         for name, value in (
-            named_inputs.items() if isinstance(named_inputs, Mapping) else names.split_pairs(named_inputs)
+            named_values.items() if isinstance(named_values, Mapping) else names.split_pairs(named_values)
         ):
             x[..., names.find_index(name)] = (
                 _parse_number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -544,35 +538,39 @@ class OracleQuery:
     def select(self, part: slice | IntArray) -> QueryBatch:
         """Select configurations by flat indices."""
 
-        def pick(x: FloatArray, own: int = 1) -> FloatArray:
-            batch, one = x.shape[: x.ndim - own], x.shape[x.ndim - own :]
-            if batch == self.shape:
-                return x.reshape(self.n, *one)[part]
-            numbers = np.arange(part.start, part.stop) if isinstance(part, slice) else part
-            spread: FloatArray = np.broadcast_to(x, (*self.shape, *one))
-            return spread[np.unravel_index(numbers, self.shape)]
+        def pick(x: FloatArray, own_axes: int = 1) -> FloatArray:
+            batch_shape, own_shape = x.shape[: x.ndim - own_axes], x.shape[x.ndim - own_axes :]
+            if batch_shape == self.shape:
+                return x.reshape(self.n, *own_shape)[part]
+            indices = np.arange(part.start, part.stop) if isinstance(part, slice) else part
+            broadcast_x: FloatArray = np.broadcast_to(x, (*self.shape, *own_shape))
+            return broadcast_x[np.unravel_index(indices, self.shape)]
 
         base = self.base
         if base is not None:
             base = BaseRows(pick(base.placement, 2), pick(base.velocity), pick(base.acceleration))
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
-    def flatten_result(self, result: FloatArray, axes: int) -> FloatArray:
-        """Flatten a result's batch axes.
+    def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
+        """Flatten a result's batch axes; the last `own_axes` axes are not batch axes.
 
-        An unexpected shape raises OracleError.
+        Raises:
+            OracleError: the batch shape is not that of the arguments.
         """
-        own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
-        if result.shape != (*self.shape, *several, *own):
+        own_shape, frame_axis = (
+            result.shape[result.ndim - own_axes :],
+            () if self._is_one else (len(self.frames),),
+        )
+        if result.shape != (*self.shape, *frame_axis, *own_shape):
             raise OracleError(
                 "the batch shape of a result does not match that of the arguments", found=str(result.shape)
             )
-        return result.reshape(self.n, len(self.frames), *own)
+        return result.reshape(self.n, len(self.frames), *own_shape)
 
 
-def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
+def read_mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
     try:
-        return rules_of_text(text, set(joints))
+        return parse_mimic_rules(text, set(joints))
     except (ValueError, ExpatError) as error:
         raise OracleError(
             "the oracle's reader cannot read the mimic rules", where=robot, found=str(error)
@@ -582,10 +580,10 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results in urdfkin's layout.
 
-    An oracle takes only names and sizes from `tree`.
-    Results have the shape (n, frames, ...).
+    An oracle takes only names and sizes from `tree`. Results have the shape (n, frames, ...).
 
     Args:
+        mimic: If False, mimic joints are independent joints.
         moving_base: A free-flyer moves the root.
         root_joint: Kind of an added root joint. The text does not contain this joint.
         lock: Values of locked joints, rad or m.
@@ -611,14 +609,14 @@ class Oracle:
         self.text, self.tree, self.mimic = text, tree, mimic
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
-    def read_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
+    def read_and_check_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: the tree has other joints or another order.
+            OracleError: the tree has other joints or another order, or a mimic rule cannot be read.
         """
         tree = self.tree
-        rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
+        rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
         coordinates = [name for name in joints if name not in rules]
         for what, theirs, own in (
             ("joints", list(joints), [joint.name for joint in tree.joints if joint.kind.nv]),
@@ -655,10 +653,7 @@ class Oracle:
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians in blocks.
-
-        Each block may overwrite the previous block.
-        """
+        """Yield the Jacobians in blocks. Each block may overwrite the previous block."""
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
@@ -678,14 +673,13 @@ class Oracle:
 def couple_columns(
     full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
 ) -> FloatArray:
-    """Return the product J_full G.
+    """Return the product J_full G. The kernel and NumPy return identical results.
 
-    The kernel and NumPy return identical results.
-    `columns` contains the column indices i of J_full, in the order of addition.
-    Column i, multiplied by `factor[i]`, is added to column `index[i]` of the product.
+    `columns` contains the column indices i of J_full, in the order of addition. Column i, multiplied by
+    `factor[i]`, is added to column `index[i]` of the product.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
-    if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:
+    if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:
         begin = time.thread_time()
         sums = _couple_rows(rows, columns, index, factor, nv)
         preload.add_time("coupling", time.thread_time() - begin)

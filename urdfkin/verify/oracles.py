@@ -35,7 +35,7 @@ class OracleLibrary:
     adapt_magnitudes: Callable[[Any], Any]
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
-        return _library, (self.name,)
+        return _restore_library, (self.name,)
 
     @property
     def name_and_version(self) -> str:
@@ -61,25 +61,25 @@ MUJOCO = OracleLibrary(
 ORACLES: dict[str, OracleLibrary] = {oracle.name: oracle for oracle in (PINOCCHIO, MUJOCO)}
 
 
-def _library(name: str) -> OracleLibrary:
+def _restore_library(name: str) -> OracleLibrary:
     return ORACLES[name]
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    wanted = as_str(name, "oracle")
-    if (oracle := ORACLES.get(wanted)) is None:
-        raise UnknownNameError("oracle", wanted, ORACLES)
+    library_name = as_str(name, "oracle")
+    if (oracle := ORACLES.get(library_name)) is None:
+        raise UnknownNameError("oracle", library_name, ORACLES)
     if oracle is not PINOCCHIO:
         oracle.version()  # `version` raises an error if the library is missing.
     return oracle
 
 
-def version(package: str) -> str:
+def package_version(package: str) -> str:
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 
-def versions(oracles: Iterable[str | None] = ()) -> dict[str, str]:
+def package_versions(oracles: Iterable[str | None] = ()) -> dict[str, str]:
     packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
     packages += sorted({ORACLES[name].package for name in oracles if name in ORACLES})
-    found = {package: version(package) for package in packages}
+    found = {package: package_version(package) for package in packages}
     return {"python": platform.python_version(), "pin": PINOCCHIO.version()} | found

@@ -33,11 +33,11 @@ from urdfkin.verify.oracle import (
     PinocchioLayout,
     QueryBatch,
     find_locked_values,
-    free_flyer,
     free_flyer_acceleration,
+    free_flyer_q,
     free_flyer_velocity,
     make_pinocchio_frames,
-    mimic_rules,
+    read_mimic_rules,
 )
 
 #: urdfkin requires these versions of Pinocchio.
@@ -107,23 +107,22 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link.
-#: The parser of Pinocchio 4.1.0 needs less than 4 kB of stack per link.
+#: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
+#: Pinocchio reads chains with fewer joints than this number without a stack overflow, in any thread.
 _SAFE_DEPTH = 100
-#: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
+#: Maximum nv of a robot, mimic joints included. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), so 2 GB
+#: at this limit.
 MAX_NV = 315
 
-#: Number of floating-point values in a block of results.
-#: A block of this size fits into the processor's cache.
-_BLOCK_SIZE = 16384
+#: A block of results with this number of doubles (128 kB) fits into the processor's cache.
+_FLOATS_PER_BLOCK = 16384
 #: `compute(n)` returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
+#: Name of the free-flyer's joint and frame.
 _BASE_NAME = "base"
 
-#: Prefix of link names while Pinocchio reduces a model.
-#: XML forbids U+0001, so no URDF name has this prefix.
+#: Prefix of link names while Pinocchio reduces a model. XML forbids U+0001, so no URDF name has this prefix.
 _LINK_PREFIX = "\x01"
 
 
@@ -138,8 +137,11 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    Without enough memory or stack, Pinocchio would crash the process.
-    `lock` contains joint values in rad or m.
+    Without enough memory or stack, Pinocchio would crash the process. `lock` contains joint values in rad or
+    m. `lock_mimic_joints` also locks the mimic joints of these joints.
+
+    Raises:
+        OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -150,15 +152,17 @@ def build_model(
         )
     depth = tree_depth(tree)
     if depth < _SAFE_DEPTH:
-        model = _parse(text, tree, root_joint, mimic)
+        model = _parse_model(text, tree, root_joint, mimic)
     else:
-        model = call_with_stack(depth * _STACK_BYTES_PER_LINK, lambda: _parse(text, tree, root_joint, mimic))
+        model = call_with_stack(
+            depth * _STACK_BYTES_PER_LINK, lambda: _parse_model(text, tree, root_joint, mimic)
+        )
     return _reduce_model(model, text, lock, lock_mimic_joints=lock_mimic_joints) if lock else model
 
 
 def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimic_joints: bool) -> Any:
     pin, q = pinocchio(), pinocchio().neutral(model)
-    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if lock_mimic_joints else {}
+    rules = read_mimic_rules(text, list(model.names)[1:], str(model.name)) if lock_mimic_joints else {}
     locked = find_locked_values(lock, rules)
     ids = [int(model.getJointId(name)) for name in locked]
     for i, (name, value) in zip(ids, locked.items(), strict=True):
@@ -181,7 +185,7 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
     return reduced
 
 
-def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
+def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) -> Any:
     pin = pinocchio()
     roots = {"floating": pin.JointModelFreeFlyer, "planar": pin.JointModelPlanar}
     try:
@@ -189,8 +193,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds all known causes of this error before Pinocchio reads the text.
-        # An error from Pinocchio at this point therefore has an unknown cause.
+        # `urdfkin check` finds all known causes before Pinocchio reads the text. This cause is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -213,7 +216,7 @@ class PinocchioOracle(Oracle):
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
         if self.moving_base:
             joints, self._index = self._add_free_flyer(joints)
-        self._layout = PinocchioLayout(self._model, joints, names, self.read_rules(names))
+        self._layout = PinocchioLayout(self._model, joints, names, self.read_and_check_rules(names))
         self._joint_ids = dict(zip(names, joints, strict=True))
         self.new_data = self._model.createData
 
@@ -224,8 +227,7 @@ class PinocchioOracle(Oracle):
             New joint indices and frame indices.
         """
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects links with the name of a joint.
-        # All joints and frames therefore get unique names.
+        # `appendModel` rejects links with the name of a joint, so all joints and frames get unique names.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -249,15 +251,17 @@ class PinocchioOracle(Oracle):
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
         return self._pin.ReferenceFrame.names[name]
 
-    def _convert_inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
-        """Convert the first `count` inputs to Pinocchio's vectors."""
-        q, *v_and_a = x.inputs[:count]
+    def _convert_inputs(self, x: QueryBatch, input_count: int) -> tuple[FloatArray, ...]:
+        """Convert the first `input_count` inputs to Pinocchio's vectors."""
+        q, *v_and_a = x.inputs[:input_count]
         full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:
-            full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
+            full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer_q(x.base)
         if self.moving_base and x.base is not None:
-            for rates, of_base in zip(full[1:], (free_flyer_velocity, free_flyer_acceleration), strict=False):
-                rates[:, :6] = of_base(x.base)
+            for rates, convert_base in zip(
+                full[1:], (free_flyer_velocity, free_flyer_acceleration), strict=False
+            ):
+                rates[:, :6] = convert_base(x.base)
         return tuple(full)
 
     # -- quantities ----------------------------------------------------------------------------------
@@ -278,10 +282,10 @@ class PinocchioOracle(Oracle):
     def accelerations(self, x: QueryBatch) -> FloatArray:
         return self._six_vectors(x, 3, self._pin.getFrameClassicalAcceleration)
 
-    def _six_vectors(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
+    def _six_vectors(self, x: QueryBatch, input_count: int, get: Callable[..., Any]) -> FloatArray:
         return self._collect_results(
             (6,),
-            self._convert_inputs(x, count),
+            self._convert_inputs(x, input_count),
             self._pin.forwardKinematics,
             lambda *arguments: get(*arguments).vector,
             self._find_ids(x),
@@ -290,14 +294,14 @@ class PinocchioOracle(Oracle):
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        if len(x.frames) == 1 and not (x.frames_are_joints or x.is_partial):
+        if len(x.frames) == 1 and not (x.frames_are_joints or x.uses_multi_frame_functions):
             shape = len(x.inputs[0]), 1, 6, self._model.nv
             return self._layout.couple(_stack_results(self._frame_jacobians(x), *shape))
         get = pin.getJointJacobian if x.frames_are_joints else pin.getFrameJacobian
-        return self._columns(x, 1, pin.computeJointJacobians, get)
+        return self._compute_columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        if len(x.frames) != 1 or x.frames_are_joints or x.is_partial or not self._model.nv:
+        if len(x.frames) != 1 or x.frames_are_joints or x.uses_multi_frame_functions or not self._model.nv:
             yield self.jacobians(x)
             return
         memory = np.empty((min(len(x.q), _block_length(6, self._model.nv)), 1, 6, self._model.nv))
@@ -305,27 +309,27 @@ class PinocchioOracle(Oracle):
             yield self._layout.couple(block)
 
     def _frame_jacobians(self, x: QueryBatch) -> _NextResults:
-        (one,), wanted = self._find_ids(x), self._convert_reference(x.reference)
-        found = self._map_configurations(
-            self._pin.computeFrameJacobian, self._convert_inputs(x, 1), one, wanted
+        (frame,), reference = self._find_ids(x), self._convert_reference(x.reference)
+        jacobians = self._map_configurations(
+            self._pin.computeFrameJacobian, self._convert_inputs(x, 1), frame, reference
         )
-        return lambda n: list(islice(found, n))
+        return lambda n: list(islice(jacobians, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
         get = pin.getJointJacobianTimeVariation if x.frames_are_joints else pin.getFrameJacobianTimeVariation
-        return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
+        return self._compute_columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
 
-    def _columns(
-        self, x: QueryBatch, count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
+    def _compute_columns(
+        self, x: QueryBatch, input_count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
     ) -> FloatArray:
-        inputs, ids, wanted = (
-            self._convert_inputs(x, count),
+        inputs, ids, reference = (
+            self._convert_inputs(x, input_count),
             self._find_ids(x),
             self._convert_reference(x.reference),
         )
         return self._layout.couple(
-            self._collect_results((6, self._model.nv), inputs, compute, get, ids, wanted)
+            self._collect_results((6, self._model.nv), inputs, compute, get, ids, reference)
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
@@ -337,16 +341,16 @@ class PinocchioOracle(Oracle):
           axes.
         """
         pin, model, data = self._pin, self._model, self.data
-        ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
+        ids, reference, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
         out = np.zeros((len(x.q), len(ids), 6, nv, nv))
         moving = [(f, i) for f, i in enumerate(ids) if nv and model.frames[i].parentJoint]
         for to, q_k in zip(out, *self._convert_inputs(x, 1), strict=True):
             pin.computeJointJacobians(model, data, q_k)
             pin.computeJointKinematicHessians(model, data)
             for f, frame in moving:
-                numbers = pin.getFrameKinematicHessian(model, data, frame, wanted).ravel("K")
+                numbers = pin.getFrameKinematicHessian(model, data, frame, reference).ravel("K")
                 to[f] = numbers.reshape(nv, nv, 6).T
-        if wanted == pin.LOCAL:
+        if reference == pin.LOCAL:
             for joint in model.joints[1:]:
                 columns = slice(joint.idx_v, joint.idx_v + joint.nv)
                 out[..., columns, columns] = 0.0
@@ -354,11 +358,10 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the joint Jacobian's columns, including mimic joints."""
+        """Return the joint Jacobian (n, 6, columns) in WORLD, with mimic joints, without the base."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes for a Jacobian without columns.
-        # For one column, Pinocchio 4.1 returns a vector.
+        # Pinocchio 4.1 crashes for a Jacobian without columns. For one column, it returns a vector.
         for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -394,11 +397,8 @@ def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
 
 
 def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
-    """Yield results in blocks of `memory`.
-
-    Later blocks may overwrite earlier blocks.
-    Pinocchio 4.1 crashes the process for a Jacobian without columns.
-    """
+    """Yield results in blocks of `memory`. Later blocks may overwrite earlier blocks."""
+    # Pinocchio 4.1 crashes the process for a Jacobian without columns.
     if 0 in memory.shape:
         yield memory
         return
@@ -413,7 +413,7 @@ def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[Float
 
 
 def _block_length(*shape: int) -> int:
-    return _BLOCK_SIZE // (math.prod(shape) or 1) or 1
+    return _FLOATS_PER_BLOCK // (math.prod(shape) or 1) or 1
 
 
 def tree_depth(tree: KinematicTree) -> int:

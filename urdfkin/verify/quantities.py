@@ -162,7 +162,7 @@ RELATIVE_PLACEMENT = replace(
     name="relative placement",
     title="placement in another frame",
     results_and_bound=partial(
-        lazy_import("urdfkin.verify.derived:check_relative_placement"), PLACEMENT.bound
+        lazy_import("urdfkin.verify.derived:derive_relative_placement"), PLACEMENT.bound
     ),
     recursive=False,
     command="",
@@ -273,7 +273,7 @@ ANALYTICAL_JACOBIAN = replace(
     equations=("7.118", "7.122"),
     compute=lazy_import("urdfkin.kinematics.bodies:analytical_jacobian"),
     results_and_bound=partial(
-        lazy_import("urdfkin.verify.derived:check_analytical_jacobian"), JACOBIAN.bound
+        lazy_import("urdfkin.verify.derived:derive_analytical_jacobian"), JACOBIAN.bound
     ),
     recursive=False,
     has_reference=False,
@@ -294,7 +294,7 @@ IMU = replace(
     title="IMU reading",
     equations=("7.127", "7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:imus"),
-    results_and_bound=lazy_import("urdfkin.verify.derived:check_imu"),
+    results_and_bound=lazy_import("urdfkin.verify.derived:derive_imu_reading"),
     recursive=False,
     has_reference=False,
     labels=("ax", "ay", "az", "wx", "wy", "wz"),

@@ -24,11 +24,11 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.urdf.sources import Origin
-from urdfkin.verify.bounds import KERNELS, Bound, compute_magnitudes
+from urdfkin.verify.bounds import VERIFY_KERNELS_MODULE, Bound, compute_magnitudes
 from urdfkin.verify.call import Call, CallPart
 from urdfkin.verify.certificate import Certificate, Ledger, VerificationError
 from urdfkin.verify.comparison import (
-    CHECK_KERNELS,
+    CHECK_KERNEL_NAMES,
     BatchComparison,
     compare,
     compare_units,
@@ -241,8 +241,8 @@ class Verifier:
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
             return lambda *arguments: None
-        for kernel in CHECK_KERNELS:
-            preload.get_kernel(kernel, preload.LOAD_AFTER, KERNELS)
+        for kernel in CHECK_KERNEL_NAMES:
+            preload.get_kernel(kernel, preload.LOAD_AFTER, VERIFY_KERNELS_MODULE)
 
         def compute_and_check(*arguments: Any) -> FloatArray | None:
             result = compute(*arguments)

@@ -25,7 +25,7 @@ from urdfkin.verify.exact.numbers import (
     rotation_about,
     rotation_from_quaternion,
 )
-from urdfkin.verify.oracle import BaseNumbers
+from urdfkin.verify.oracle import BaseMotionLike
 
 _RECURSION = Recursion(equations)
 
@@ -38,7 +38,7 @@ _VELOCITY_AXES = {
 }
 
 
-def make_base_state(base: BaseNumbers) -> LinkState:
+def make_base_state(base: BaseMotionLike) -> LinkState:
     def as_interval_vector(x: FloatArray) -> Vector:
         return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
 
