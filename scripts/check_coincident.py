@@ -17,22 +17,17 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 
-import urdfkin
+from tests.comparison.test_same import same_as_own_table
 from tests.dh.arms import CONVENTIONS, disguised
 from tests.dh.test_compare import nearly_coincident
-from urdfkin.comparison.result import Verdict
 from urdfkin.dh import make_dh_table
 from urdfkin.dh.compare import TableComparison, compare
 from urdfkin.dh.convert import to_convention
 from urdfkin.errors import UrdfkinError
 from urdfkin.model.chain import make_chain
-from urdfkin.model.tree import JointKind, Limit
-from urdfkin.urdf.writer import to_urdf
 
 MAX_STRICT = MAX_SAME = 400
-_LIMIT = Limit(-1.0, 1.0, 1.0, 1.0)
 
 
 def compare_arm(seed: int) -> Iterator[TableComparison]:
@@ -53,17 +48,6 @@ def compare_strict(seed: int) -> TableComparison | None:
     return compare(make_chain(tree, "tip"), disguised(table, seed))
 
 
-def same_verdict(seed: int) -> Verdict:
-    """Compare an arm with its table by `same`."""
-    tree = nearly_coincident(seed)
-    table = disguised(make_dh_table(tree, "tip"), seed)
-    joints = tuple(
-        replace(joint, kind=JointKind.CONTINUOUS) if joint.kind.turns else replace(joint, limit=_LIMIT)
-        for joint in tree.joints
-    )
-    return urdfkin.same(urdfkin.load(to_urdf(replace(tree, joints=joints))), table, bounds=False).verdict
-
-
 def summarize(results: list[TableComparison]) -> str:
     exact = sum(result.is_exact for result in results)
     different = sum(not result.agrees for result in results)
@@ -82,6 +66,6 @@ if __name__ == "__main__":
     print(f"tables {summarize(results)}", flush=True)
     strict = [result for seed in range(min(options.arms, MAX_STRICT)) if (result := compare_strict(seed))]
     print(f"strict tables {summarize(strict)}", flush=True)
-    verdicts = Counter(same_verdict(seed).value for seed in range(min(options.arms, MAX_SAME)))
+    verdicts = Counter(same_as_own_table(seed).verdict.value for seed in range(min(options.arms, MAX_SAME)))
     print("same", *(f"{count} {verdict}" for verdict, count in verdicts.most_common()), sep=", ")
     sys.exit(not all(result.agrees for result in (*results, *strict)))

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,14 +17,19 @@ from tests.cli.running import refused
 from tests.cli.running import urdfkin as run
 from tests.comparison import pairs
 from tests.comparison.pairs import certified, changed, files_of, moves_alike, robot, written
+from tests.dh.arms import disguised
+from tests.dh.test_compare import nearly_coincident
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.certificate import SAME, certificate, difference_text, recheck
-from urdfkin.comparison.result import Verdict
+from urdfkin.comparison.result import Sameness, Verdict
+from urdfkin.dh import make_dh_table
+from urdfkin.model.mechanisms.joint_matching import Axis
 from urdfkin.model.mechanisms.matcher import MechanismMatcher
-from urdfkin.model.mechanisms.mechanism import Alignment, FreeJointConversion, Mechanism
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.mechanisms.mechanism import Alignment, FreeJointConversion, Mechanism, Screw
+from urdfkin.model.tree import FloatArray, JointKind, Limit
 from urdfkin.robot import Robot
+from urdfkin.urdf.writer import to_urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -130,6 +136,35 @@ def test_a_different_tool_is_a_conversion_and_not_a_difference() -> None:
 
 
 @pytest.mark.slow
+def same_as_own_table(seed: int) -> Sameness:
+    """Compare a random arm with its own table; the table has other signs, zeros, base and tool."""
+    tree = nearly_coincident(seed)
+    table = disguised(make_dh_table(tree, "tip"), seed)
+    joints = (
+        replace(joint, kind=JointKind.CONTINUOUS)
+        if joint.kind.turns
+        else replace(joint, limit=Limit(-1.0, 1.0, 1.0, 1.0))
+        for joint in tree.joints
+    )
+    return urdfkin.same(to_urdf(replace(tree, joints=tuple(joints))), table, bounds=False)
+
+
+# The joints of arm 21 are not nearly parallel. The other arms have axes with tilts down to 1e-9 rad.
+@pytest.mark.parametrize("seed", [8, 10, 17, 21, 27, 36, 52])
+def test_an_arm_is_equivalent_to_its_own_table_although_the_frames_differ(seed: int) -> None:
+    found = same_as_own_table(seed)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert "tools" in found.up_to
+
+
+@pytest.mark.parametrize("tilt", [1e-2, 1e-6, 1e-9, 1e-11])
+def test_the_nearest_point_of_nearly_parallel_lines_is_exact(tilt: float) -> None:
+    line = Screw(np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    crossing = Screw(np.array([0.0, math.sin(tilt), math.cos(tilt)]), np.array([0.01, 0.0, 5.0]))
+    found = Axis(crossing, True, line).nearest_point_coordinate(line.direction)
+    assert found == pytest.approx(5.0, abs=1e-15 / tilt)
+
+
 def test_a_table_of_a_robot_is_the_same_robot() -> None:
     found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"))
     assert found.differences == ()

@@ -165,11 +165,14 @@ class Comparator:
             _fix_idle_mimic_joints(a, b, names, labels),
             _fix_idle_mimic_joints(b, a, _swap_pairs(names), swapped),
         )
+        separating_joints = (
+            _joints_fixed_in_one(*trees, self.spellings, labels),
+            _joints_fixed_in_one(*trees[::-1], _swap_pairs(self.spellings), swapped),
+        )
+        is_table = [bool(robot.origin.table) for robot in robots]
         self.mechanisms = (
-            Mechanism(trees[0], _joints_fixed_in_one(*trees, self.spellings, labels), labels[0]),
-            Mechanism(
-                trees[1], _joints_fixed_in_one(*trees[::-1], _swap_pairs(self.spellings), swapped), labels[1]
-            ),
+            Mechanism(trees[0], separating_joints[0], labels[0], free_frames=is_table[0]),
+            Mechanism(trees[1], separating_joints[1], labels[1], free_frames=is_table[1]),
         )
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
             if not mechanism.size <= MAX_PATH_METRES:
@@ -181,7 +184,7 @@ class Comparator:
                     remedy="write origins in metres",
                 )
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
-        self.has_table = any(robot.origin.table for robot in robots)
+        self.has_table = any(is_table)
 
     def compare(self) -> Sameness:
         alignment = self.alignment()

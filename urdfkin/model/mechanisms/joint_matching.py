@@ -280,11 +280,12 @@ class Axis:
             The point's coordinate along u (m); None for prismatic joints and parallel lines.
         """
         s, start = self.screw, self.reference_line
-        along_s = float(start.direction @ s.direction)
-        if not self.turns or 1.0 - along_s**2 < PARALLEL_TOLERANCE**2:
+        # A formula with 1 - cos^2 of the angle loses all digits at angles below 1e-8.
+        normal = np.cross(start.direction, s.direction)
+        squared_sine = float(normal @ normal)
+        if not self.turns or squared_sine < PARALLEL_TOLERANCE**2:
             return None
-        offset = s.point - start.point
-        distance = float(offset @ start.direction - along_s * (offset @ s.direction)) / (1.0 - along_s**2)
+        distance = float(np.cross(s.point - start.point, s.direction) @ normal) / squared_sine
         return float(u @ (start.point + distance * start.direction))
 
 
@@ -312,18 +313,23 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
             yield candidate
 
 
+#: Two axes are nearly parallel if the sine of their angle is smaller than this.
+NEARLY_PARALLEL = 1e-2
+
+
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference_line: Both[Screw]
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes: an axis of A after the joint `via[0]`, and an axis of B after the joint `via[1]`.
 
-    A branch stops after the first axis of A that is not parallel to `reference_line[0]`.
+    A branch stops after the first axis of A that is clearly not parallel to `reference_line[0]`. A nearly
+    parallel axis determines zero offsets inexactly.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction)) < PARALLEL_TOLERANCE:
+        if np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction)) < NEARLY_PARALLEL:
             next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
             yield from later_axes(
                 mechanisms, (e, f), next_bodies, screws if axes[0].turns else reference_line

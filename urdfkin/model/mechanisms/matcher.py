@@ -149,7 +149,7 @@ class MechanismMatcher:
         best: Alignment | None = None
         for bodies, X in self._start_candidates():
             alignment = self._match_from(bodies, X)
-            if best is None or is_better(alignment.score, best.score):
+            if best is None or _is_better_alignment(alignment, best):
                 best, self.match_count = alignment, alignment.match_count
             if not best.max_difference and not (best.only_a and best.only_b):
                 break
@@ -249,6 +249,8 @@ class MechanismMatcher:
             bodies = BodyPair(base, (None, None), -1, IDENTITY, X)
             scored.append((0.0, bodies, self._score(bodies)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
+        if self.a.free_frames or self.b.free_frames:
+            best = best[0], math.inf
         yield from (bodies.motion_b for _, bodies, score in scored if not is_better(best, score))
 
     # -- matching ------------------------------------------------------------------------------------
@@ -675,6 +677,13 @@ def _best_of(
     return best
 
 
+def _is_better_alignment(one: Alignment, than: Alignment) -> bool:
+    # The frames of a table are free, so its links decide only between alignments with equal joints.
+    if (one.a.free_frames or one.b.free_frames) and one.all_joints_agree != than.all_joints_agree:
+        return one.all_joints_agree
+    return is_better(one.score, than.score)
+
+
 def is_better(score: Score, than: Score) -> bool:
     return score[0] > than[0] or (score[0] == than[0] and score[1] < BETTER_RATIO * than[1])
 
@@ -745,7 +754,7 @@ def align(
             moved = [k for k, name in enumerate(names) if name != run[k]]
             other = present.reorder(names[moved[0] : moved[-1] + 1])
             candidate = _best_alignment(a, other, name_map, None)
-            if is_better(candidate.score, best.score):
+            if _is_better_alignment(candidate, best):
                 best = candidate
     return _with_zeros_by_mimic_rules(
         _with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map)
@@ -801,7 +810,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
         (a, b), (c, d) = pairs
         other = {joints[0][a].name: joints[1][d].name, joints[0][c].name: joints[1][b].name}
         candidate = _best_alignment(best.a, best.b, {**name_map, **other}, None, look_ahead, base=best.base)
-        if is_better(candidate.score, best.score):
+        if _is_better_alignment(candidate, best):
             best, name_map = candidate, {**name_map, **other}
     return best
 
@@ -811,6 +820,8 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
 
     If all axes differ slightly, no axes agree within the normal tolerance.
     """
+    if best.all_joints_agree and (best.a.free_frames or best.b.free_frames):
+        return best
     a, b, (least, most), look_ahead = (
         best.a,
         best.b,

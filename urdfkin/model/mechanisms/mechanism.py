@@ -267,6 +267,7 @@ class Mechanism:
         tree: The robot.
         separating_joints: Indices in `tree.joints` of fixed joints that move in the other model.
         labels: Label of each link, by default its name. Links with equal labels are paired.
+        free_frames: Whether a convention chooses the links' frames, as in a Denavit-Hartenberg table.
 
     Attributes:
         zero_poses: (4, 4) pose of each link in the root frame.
@@ -279,8 +280,10 @@ class Mechanism:
         tree: KinematicTree,
         separating_joints: Collection[int] = (),
         labels: Sequence[str] | None = None,
+        *,
+        free_frames: bool = False,
     ) -> None:
-        self.tree = tree
+        self.tree, self.free_frames = tree, free_frames
         self.labels = tree.links if labels is None else tuple(labels)
         self.zero_poses, self.body_of, self.bodies, self.edges = [np.eye(4)], [0], [[0]], list[Edge]()
         self.lengths, self.depths = [0.0], [0]
@@ -585,6 +588,13 @@ class Alignment:
         """Whether all joints are matched, and all matched joints and links agree."""
         alike = not any(step.kind_difference for step in self.steps)
         return alike and not (self.max_difference or self.only_a or self.only_b)
+
+    @property
+    def all_joints_agree(self) -> bool:
+        """Whether all joints are matched, and all matched joints agree."""
+        return not (
+            self.only_a or self.only_b or any(step.differs or step.kind_difference for step in self.steps)
+        )
 
     @property
     def difference_count(self) -> int:
