@@ -5,6 +5,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 from tests.cli.running import good, urdfkin
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
+from tests.reading import present
 from urdfkin.dh import DHTable, export, table_from_rows, to_tree
 from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import make_screws
@@ -23,6 +25,7 @@ from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
+from urdfkin.verify.conversions import check_opw
 from urdfkin.verify.oracle import QueryBatch
 
 H = math.pi / 2
@@ -205,6 +208,14 @@ def test_a_calibrated_arm_is_an_opw_arm_only_within_a_tolerance() -> None:
         find_opw(path)
     found = find_opw(path, 0.02)
     assert found.lengths["c2"] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_the_check_of_an_opw_solver_states_the_distance_and_the_angle_of_the_tip() -> None:
+    robot = load("kinova")
+    chain = robot.chain()
+    found = find_opw(chain, 1e-6)
+    moved = replace(found, tool=found.tool @ shift(0.03, 0.04, 0.0) @ rotation("z", 0.2))
+    assert "by at most 5.00e-02 m and 2.00e-01 rad" in present(check_opw(robot.verifier, chain, moved))
 
 
 @pytest.mark.slow

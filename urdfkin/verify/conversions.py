@@ -28,6 +28,7 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.dh.common_normals import sum_zeroed_tilts
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.screws import ProductOfExponentials
+from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.structure import OpwParameters
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
@@ -121,10 +122,12 @@ def check_opw(verifier: Verifier, chain: FrameChain, opw: OpwParameters) -> str 
         return None
     q, base, tip = _sample_base_and_tip(verifier, chain.base, chain.tip)
     values = chain.coupling.values(chain.coupling.select(verifier.tree, q))
-    differences = np.abs(base @ opw.placement(values) - tip)[:, :3]
+    found = base @ opw.placement(values)
+    metres = np.linalg.norm(found[:, :3, 3] - tip[:, :3, 3], axis=-1).max()
+    radians = rotation_angle(found[:, :3, :3], tip[:, :3, :3]).max()
     return (
         "the OPW solver's tip pose base . F(sign q - offset) . tool differs from Pinocchio by at most"
-        f" {differences[..., 3].max():.2e} m and {differences[..., :3].max():.2e} rad on {len(q)} samples"
+        f" {metres:.2e} m and {radians:.2e} rad on {len(q)} samples"
     )
 
 
