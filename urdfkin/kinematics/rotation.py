@@ -77,7 +77,7 @@ def skew(w: ArrayLike) -> FloatArray:
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the vector w of S(w) (7.26, 7.37).
 
-    |S + S^T| / 2 <= tolerance * |S|, where |.| is the largest absolute entry.
+    Raise InputError if |S + S^T| / 2 > tolerance * |S|, where |.| is the largest absolute entry.
     """
     S = as_matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -115,9 +115,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the nearest rotation.
-
-    The matrix must have a positive determinant.
+    """Return the rotation nearest to M, a matrix with a positive determinant.
 
     >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -249,7 +247,7 @@ def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate_quaternion(quat: ArrayLike) -> FloatArray:
-    """Return the conjugate (-q, q0)."""
+    """Return the conjugate (-q, q0) of a quaternion of any length."""
     conjugated: FloatArray = as_vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
@@ -292,11 +290,11 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate 7.57 by the fourth-order Runge-Kutta method.
+    """Integrate 7.57 by the fourth-order Runge-Kutta method; return the quaternions (n, ..., 4) at n times.
 
-    `quat` is the orientation at the first time. The `times` (s) increase.
-    A jump of `w` must be at one of the `times`.
-    No step evaluates `w` at one of the `times`.
+    `quat` is the orientation at the first time. The `times` (s) increase. `w(t)` is the angular velocity
+    (rad/s), expressed in `frame`. A jump of `w` must be at one of the `times`, because no step evaluates `w`
+    at one of the `times`.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -329,7 +327,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Compute 7.57 for a quaternion with |quat| != 1."""
+    """Compute 7.57 for a quaternion of any length except 0."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
@@ -460,10 +458,7 @@ def _make_sequence(name: str) -> EulerSequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz.
-
-    The constant entries are exactly 0 and 1.
-    """
+    """Return Rx, Ry or Rz for the axis 0, 1 or 2; the constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -619,6 +614,8 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
 
         singular values of Omega:  1, sqrt(1 + cos d), sqrt(1 - cos d)
         condition number:          cot(d/2)
+
+    The singularity itself, d = 0, raises RepresentationSingularityError.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

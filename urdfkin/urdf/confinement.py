@@ -90,10 +90,7 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or is below `root` and not hidden.
-
-    A path is hidden if the name of a file or folder in the path, below `root`, begins with a dot.
-    """
+    """Return whether `path` is `root`, or is below `root` and no name below `root` begins with a dot."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -128,7 +125,10 @@ def limit_process(seconds: int) -> None:
 
 
 def confine(is_allowed: Callable[[str], bool]) -> None:
-    """From now on, allow this process to read only the files that `is_allowed` accepts."""
+    """From now on, refuse all audit events of this process except harmless events and reads of allowed files.
+
+    `is_allowed` receives the path of a file or folder. A refused event raises RefusedError.
+    """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:
         if event in _HARMLESS_EVENTS:

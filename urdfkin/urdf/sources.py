@@ -1,7 +1,7 @@
 """Read the text of a robot from a source, and record how to load the robot again.
 
-A source is a path, a `package://` address, a catalogue name, text, bytes, an open file, or `-` for standard
-input.
+A source is a path, a `package://` or `model://` address, a catalogue name, text, bytes, an open file, or `-`
+for standard input.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Origin:
 
     Attributes:
         source: A path, a catalogue name, or `-` for standard input. If the source has no name, the value is
-            `<text>`, `<bytes>` or `<file>`.
+            a word in angle brackets, such as `<text>`, `<bytes>` or `<table>`.
         table: Whether the robot was created from a Denavit-Hartenberg table.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are omitted.
@@ -130,7 +130,7 @@ class UrdfText:
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
         source: The path or name with which the URDF can be read again. A source without a path or name has
-            the value `-`, `<text>`, `<bytes>` or `<file>`.
+            the value `-` or a word in angle brackets, such as `<text>`, `<bytes>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; empty for other sources.
     """
 
@@ -153,8 +153,11 @@ def read_source(
     `max_bytes` + 1 characters of an open text file. If the function reads more than `max_bytes` bytes or
     characters, the source is too long.
 
-    A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`. Raise
-    SourceError for an unreadable file, UnknownNameError for an unknown name, and InputError for a wrong type.
+    A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
+
+    Raise SourceError for an unreadable file or an unknown package, UnknownNameError for an unknown name or
+    xacro argument, and XacroError if xacro cannot expand the file. Raise InputError for a wrong type, an
+    empty name, and `xacro_args` for another source than a .xacro file.
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
@@ -231,7 +234,7 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
 
 
 def _resolve_package_uri(name: str, path: str) -> Path:
-    """Return the file of a `package://` address; raise SourceError for an unknown package."""
+    """Return the file of a `package://` or `model://` address; raise SourceError for an unknown package."""
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:

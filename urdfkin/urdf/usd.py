@@ -150,7 +150,7 @@ class Usd:
         rest_poses: (n, 4, 4) poses of the prims in the world, in the order of `prims`, in m with z up.
             UsdGeom computes the poses.
         rest_q: (nq,) configuration in which the links have the poses `rest_poses`. For planar and floating
-            joints, `rest_q` contains the zero configuration.
+            joints, `rest_q` contains the neutral configuration.
         single_rounding_terms: Five numbers for each joint, by joint name. The numbers bound the effect of
             rounding to single precision:
 
@@ -193,7 +193,10 @@ def import_openusd() -> Any:
 def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage.
 
-    The function checks the references of each layer before OpenUSD follows the references.
+    The function checks the references of each layer before OpenUSD follows the references. Raise InputError
+    for a forbidden reference, value clips, a Git LFS pointer, a layer that OpenUSD does not accept, and more
+    than 1,000 layers. Raise SourceError for an unreadable file, and if the files together have more than
+    `MAX_BYTES` bytes.
     """
     allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
@@ -285,7 +288,12 @@ def read_usd(
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
-    that has the variant set. `articulation` is the path or name of the articulation to read.
+    that has the variant set. `articulation` is the path or name of the articulation to read, or the path of a
+    prim above several articulations. `name` is the name of the stage in messages.
+
+    Raise UnknownNameError for an unknown variant or articulation. Raise InputError if OpenUSD is not
+    installed or does not accept the file, or if the stage has no robot, several articulations and no
+    `articulation`, or an unsupported joint.
     """
     pxr = import_openusd()
     try:
@@ -380,7 +388,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read a stage.
+    """Reader of one stage.
 
     Attributes:
         source: Name of the stage in messages.
@@ -518,7 +526,10 @@ class _StageReader:
         return None
 
     def _world_pose(self, prim: Any) -> tuple[FloatArray, FloatArray]:
-        """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,)."""
+        """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,).
+
+        A reflection gives three negative scales.
+        """
         self._report_timed_transforms(prim)
         where = f"{self.source}: {prim.GetPath()}"
         M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
@@ -633,10 +644,8 @@ class _StageReader:
             length_A + length_B,
             (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
         )
-        # A and B are poses relative to a body or a world.
-        # In this world, z is up.
-        # `UsdJoint` contains poses relative to a body or the stage's world.
-        # In the stage's world, y may be up.
+        # A and B are poses in a body, or in a world with z up.
+        # `UsdJoint` contains poses in a body, or in the stage's world, in which y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             directions, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -1003,7 +1012,7 @@ class _StageReader:
             yield joint, here, there
             return
         # In a URDF, joint and child link have the same frame.
-        # If a USD joint's frame is not its child's, the joint moves an additional link.
+        # If the frames of a USD joint and its child differ, the joint moves an additional link.
         # A fixed joint connects the additional link with the child link.
         between = make_unique(f"{name}_link", self._used_link_names)
         yield joint, here, between

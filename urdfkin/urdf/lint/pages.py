@@ -39,7 +39,7 @@ URDF_RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lam
 #: The rules about MJCF and USD files.
 MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
+#: Code of each rule about URDF files. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
 CODE_BY_NAME = {
     word: rule.id for rule in URDF_RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
 }
@@ -121,6 +121,8 @@ def find_rule(word: str) -> Rule:
 
 def find_rules(word: str) -> tuple[Rule, ...]:
     """Return the rules that a word selects: a code, a short name, the first digits of codes, or ALL.
+
+    Raise UnknownNameError if the word selects no rule.
 
     >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))
     (['URDF601'], 5)
