@@ -95,8 +95,8 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     (True, ('one_link', 'planar_two_link', 'polar', 'elbow'))
     """
     families = {entry.family for entry in catalogue().values()}
-    if family is not None and family not in families:
-        raise UnknownNameError("family", as_str(family, "family"), families)
+    if family is not None and as_str(family, "family") not in families:
+        raise UnknownNameError("family", family, families)
     return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 
@@ -204,8 +204,13 @@ def find_description(source: object) -> ResolvedDescription | None:
     """Return the file of a robot in robot_descriptions, or None for any other source.
 
     `source` is the name of a description module, or the module itself. The name of a catalogue robot or of an
-    existing file gives None. Raise InputError if robot_descriptions is not installed or the module has no
-    robot file, UnknownNameError for an unknown name, and SourceError if the import or download fails.
+    existing file gives None.
+
+    | Error | Cause |
+    |---|---|
+    | InputError | robot_descriptions is not installed, or the module has no robot file |
+    | UnknownNameError | an unknown name |
+    | SourceError | the import or download fails |
     """
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or may_exist(Path(source)):

@@ -471,6 +471,8 @@ class Reporter:
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
     _element: Element | None = None
     _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
+    #: Elements of findings that are added before the call of `silence`, by the id of the finding.
+    _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(
         self,
@@ -520,6 +522,8 @@ class Reporter:
         )  # fmt: skip
         if reason is None:
             group.weighted_findings.append((finding, weight))
+            if element is not None and self.comments and not self.comment_index.comments:
+                self._elements_before_silence[id(finding)] = element
         else:
             self.silenced_findings.append((finding, reason))
 
@@ -531,8 +535,9 @@ class Reporter:
         self.comment_index = comment_index
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
+                elements = self._elements_before_silence
                 reasons = [
-                    (pair, comment_index.find_reason(code, pair[0].line, None))
+                    (pair, comment_index.find_reason(code, pair[0].line, elements.get(id(pair[0]))))
                     for pair in group.weighted_findings
                 ]
                 self.silenced_findings += [

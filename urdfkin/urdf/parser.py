@@ -26,6 +26,7 @@ from urdfkin.urdf.findings import (
     COMMENT_MARK,
     ERROR,
     MAX_QUOTE_LENGTH,
+    NEWLINE,
     NOTE,
     REFUSES,
     WARNING,
@@ -152,8 +153,8 @@ def _find_codec(name: str) -> str | None:
 
 def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
     """Return the line and the column (in characters) of a byte; both start at 1."""
-    before = data[: max(offset, 0)].decode("utf-8", "replace")
-    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+    lines = NEWLINE.split(data[: max(offset, 0)])
+    return len(lines), len(lines[-1].decode("utf-8", "replace")) + 1
 
 
 # -- XML elements
@@ -503,10 +504,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, max_length: int) -> bool:
-        """Report a number with more than `max_length` characters.
-
-        The conversion of a long text to a number takes quadratic time.
-        """
+        """Report a number that is too long; the conversion of a long text takes quadratic time."""
         if len(written) <= max_length:
             return False
         found = f"{quote(written, 30)} of {len(written)} characters, more than {max_length}"
