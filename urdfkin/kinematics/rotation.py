@@ -103,7 +103,7 @@ UNCHANGED_MATRIX_TOLERANCE = 1e-15
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the nearest rotation to a rounded rotation matrix.
 
-    M: a rotation matrix whose entries may be rounded to nine decimals
+    M: a rotation matrix with entries that may be rounded to nine decimals
     result = M - M (M^T M - I)/2, one Newton step (Bjorck and Bowie)
     M = U (I + E):  result = U (I - 3/2 E^2)
     |E| <= 3e-9
@@ -125,7 +125,7 @@ def polar_factor(M: FloatArray) -> FloatArray:
 
 
 def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
-    """Return a rotation matrix whose third column is `axis`.
+    """Return a rotation matrix with the third column `axis`.
 
     | z of `axis` | result |
     |---|---|
@@ -492,10 +492,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     | proper, such as ZYZ | [0, pi] |
     | other | [-pi/2, pi/2] |
 
-    At the singularity, only the sum or difference of the
-    first and third angle is determined.
-    At the singularity of moving axes, the third angle follows from the first angle.
-    At the singularity of fixed axes, the first angle follows from the third angle.
+    At the singularity, only the sum or difference of the first and third angle is determined. For moving
+    axes, the first angle is arbitrary (0 for exact entries of R), and the third angle completes the rotation.
+    For fixed axes, the third angle is arbitrary, and the first angle completes the rotation.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.

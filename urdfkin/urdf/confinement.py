@@ -7,6 +7,8 @@ the hook. A xacro file that controls the Python interpreter could circumvent the
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
+
+macOS does not limit the memory.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ class AllowedPaths:
     """The files that a confined process may read.
 
     Attributes:
-        roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
+        roots: Readable files, and folders with readable content, except hidden files and folders.
             The target of a symbolic link must also be in `roots` or in a folder of `roots`.
         package_folders: Folders with installed packages. A symbolic link in these folders may point to a
             package in any other folder. `colcon build --symlink-install` writes such links.

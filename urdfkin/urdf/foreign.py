@@ -140,7 +140,7 @@ def _serialize(root: Any) -> str:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-#: Names of Pinocchio's joint classes whose axis is x, y or z.
+#: Names of Pinocchio's joint classes with the axis x, y or z.
 #: R is a revolute joint, and P is a prismatic joint.
 #: RUB is a revolute joint without limits.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
@@ -209,7 +209,7 @@ class _ModelReader:
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
-        """For each body whose frame is a joint frame, yield the index of the joint and of the body.
+        """For each body with the frame of a joint, yield the index of the joint and of the body.
 
         The bodies are in reverse order. In a dictionary of the pairs, the first body of a joint therefore
         replaces the later bodies of the joint.

@@ -155,9 +155,12 @@ def read_source(
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
 
-    Raise SourceError for an unreadable file or an unknown package, UnknownNameError for an unknown name or
-    xacro argument, and XacroError if xacro cannot expand the file. Raise InputError for a wrong type, an
-    empty name, and `xacro_args` for another source than a .xacro file.
+    | Error | Cause |
+    |---|---|
+    | SourceError | an unreadable file, or an unknown package |
+    | UnknownNameError | an unknown name, or an unknown xacro argument |
+    | XacroError | xacro cannot expand the file |
+    | InputError | a wrong type, an empty name, or `xacro_args` without a .xacro file |
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))

@@ -2,8 +2,8 @@
 
 - A prim with `PhysicsRigidBodyAPI` becomes a link; the scale of the prim's frame is removed. A plain `Xform`
   prim below a body also becomes a link; a fixed joint connects this link with the body.
-- A joint prim contains the pose A of the joint frame in the first body, and the pose B of the joint frame in
-  the second body. With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
+- A joint prim contains two poses of the joint frame: pose A in the first body, and pose B in the second body.
+  With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
   If the second body is the parent in the tree, urdfkin uses the inverse, B J(q)^-1 A^-1. To compute the
   inverse, urdfkin exchanges A and B and reverses the joint axis.
 - Lengths are multiplied by `metersPerUnit`, and angles are converted from degrees. If the up axis is Y, the
@@ -291,9 +291,12 @@ def read_usd(
     that has the variant set. `articulation` is the path or name of the articulation to read, or the path of a
     prim above several articulations. `name` is the name of the stage in messages.
 
-    Raise UnknownNameError for an unknown variant or articulation. Raise InputError if OpenUSD is not
-    installed or does not accept the file, or if the stage has no robot, several articulations and no
-    `articulation`, or an unsupported joint.
+    | Error | Cause |
+    |---|---|
+    | UnknownNameError | an unknown variant set, variant or articulation |
+    | InputError | OpenUSD is not installed, or does not accept the file |
+    | InputError | the stage has no robot, an unsupported joint, or a forbidden reference |
+    | InputError | the stage has several articulations, and `articulation` is None |
     """
     pxr = import_openusd()
     try:
@@ -1245,7 +1248,7 @@ def _rounding(x: FloatArray) -> FloatArray:
 
 
 def _quaternion_rounding(xyzw: FloatArray) -> float:
-    """Return a bound (rad) on the error of a rotation whose quaternion is rounded to single precision.
+    """Return a bound (rad) on the error of a rotation from a quaternion rounded to single precision.
 
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a

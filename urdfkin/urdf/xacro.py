@@ -93,9 +93,12 @@ class XacroError(UrdfkinError):
 def expand(path: Path, arguments: Mapping[str, str], *, timeout: float = EXPANSION_TIMEOUT) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
-    Raise SourceError for a missing file, UnknownNameError for an argument that the file neither declares nor
-    uses, and XacroError if xacrodoc is not installed, or if the expansion fails or takes more than `timeout`
-    seconds.
+    | Error | Cause |
+    |---|---|
+    | SourceError | a missing file |
+    | UnknownNameError | an argument that the file neither declares nor uses |
+    | XacroError | xacrodoc is not installed |
+    | XacroError | the expansion fails, or takes more than `timeout` seconds |
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))

@@ -145,10 +145,7 @@ _ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`.
-
-    The function computes with fractions, which have no rounding errors.
-    """
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`; fractions are exact."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)
