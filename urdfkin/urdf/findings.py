@@ -236,9 +236,9 @@ class Finding:
         """Text about the line numbers in `other_lines`, for example "also on lines 3, 7"."""
         others = tuple(sorted(set(self.other_lines) - {self.line}))
         if len(others) == len(self.other_lines):
-            return f"also on {_lines(others)}"
+            return f"also on {_line_numbers_text(others)}"
         here = ("this line",) if self.line in self.other_lines else ()
-        where = (*here, _lines(others)) if others else here
+        where = (*here, _line_numbers_text(others)) if others else here
         return f"{len(self.other_lines)} more on {' and '.join(where)}"
 
     @property
@@ -292,7 +292,7 @@ def format_counts(findings: Sequence[Finding]) -> str:
     return ", ".join(words) or "no findings"
 
 
-def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
+def _line_numbers_text(lines: tuple[int, ...], shown: int = 4) -> str:
     numbers = ", ".join(str(line) for line in lines[:shown])
     rest = f" and {len(lines) - shown} more" if len(lines) > shown else ""
     return f"line{'s' if len(lines) > 1 else ''} {numbers}{rest}"
@@ -469,8 +469,9 @@ class Reporter:
     _name_search_count: int = 0
     _replaced_characters: bool | None = None
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
-    _element: Element | None = None
-    _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
+    #: The last element that `_spans` read, and its result.
+    _cached_element: Element | None = None
+    _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
     #: Elements of findings that are added before the call of `silence`, by the id of the finding.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
@@ -596,9 +597,10 @@ class Reporter:
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
     def _spans(self, element: Element) -> dict[str, _AttributeSpan]:
-        if self._element is not element:
-            self._element, self._attributes = element, dict(_attributes(self.data, element))
-        return self._attributes
+        if self._cached_element is not element:
+            self._cached_element = element
+            self._cached_spans = dict(_find_attribute_spans(self.data, element))
+        return self._cached_spans
 
     def _locate(self, element: Element, attribute: str | None) -> tuple[int, int, int]:
         span = None if attribute is None else self._spans(element).get(attribute)
@@ -658,7 +660,7 @@ NEWLINE = re.compile(rb"\r\n|\r|\n")
 _BLANKS_TO_LINE_END = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
-def _attributes(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:
+def _find_attribute_spans(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:
     tag = START_TAG.match(data, element.offset)
     if tag is None:
         return

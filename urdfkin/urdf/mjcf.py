@@ -469,7 +469,7 @@ class _MjcfReader:
             if name := m.site(i).name:
                 link = make_unique(name, self._used_link_names)
                 self.frames[link] = "site", i
-                T = _pose(m.site_pos[i], m.site_quat[i])
+                T = _pose_from_quaternion(m.site_pos[i], m.site_quat[i])
                 self._add_fixed_joint(T, self._links[m.site_bodyid[i]], link)
         rules = dict(self._read_rules())
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in self._joints]
@@ -481,7 +481,7 @@ class _MjcfReader:
 
     def _add_body(self, i: int) -> None:
         m, here = self.model, self._links[self.model.body_parentid[i]]
-        T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
+        T, link = _pose_from_quaternion(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
             what = "a mocap body is fixed at its pose in the file"
             self.remarks.append(MjcfRemark(what, f"body {link}", moves=True))
@@ -617,5 +617,5 @@ def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
     return rule
 
 
-def _pose(p: FloatArray, quaternion: FloatArray) -> FloatArray:
+def _pose_from_quaternion(p: FloatArray, quaternion: FloatArray) -> FloatArray:
     return pose(rotation_from_quaternion(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)

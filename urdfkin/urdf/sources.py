@@ -28,7 +28,7 @@ class Origin:
     Attributes:
         source: A path, a catalogue name, or `-` for standard input. If the source has no name, the value is
             a word in angle brackets, such as `<text>`, `<bytes>` or `<table>`.
-        table: Whether the robot was created from a Denavit-Hartenberg table.
+        table: Whether the robot was created from a Denavit-Hartenberg table or a product of exponentials.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are omitted.
     """

@@ -82,7 +82,7 @@ _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):refer
 #: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of joint types that a kinematic tree cannot represent.
-#: OpenUSD recognizes such types only with a plugin.
+#: OpenUSD recognizes gear joints and rack-and-pinion joints only with a plugin.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: USD attributes with the nonlinear coefficients of MuJoCo's joint equality.
 #: URDF mimic rules are linear.

@@ -56,7 +56,8 @@ class Page:
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
             example begins with a joint or a comment, the links `base` and `tip` must be added.
         correction: The corrected example.
-        other_readers: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
+        other_readers: The behaviour of other readers for the example: Pinocchio (urdfdom) and yourdfpy for a
+            URDF, programs that read MJCF or USD for the other rules.
     """
 
     title: str

@@ -44,7 +44,8 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings, sorted by line.
 
-    The function also checks that the packages and mesh files in the URDF exist. No mesh is opened.
+    The function also checks that the packages and mesh files in the URDF exist. No mesh is opened. Mesh files
+    without a package are checked only if the source is a file.
 
     Args:
         source: A path, a `package://` address, a catalogue name, URDF text, bytes, an open file, or `-` for

@@ -514,7 +514,7 @@ NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
+#: If the longest chain of a robot is shorter (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
 #: A limit is probably in degrees if it is a whole number, and
