@@ -547,7 +547,6 @@ class NumberReader:
 
 
 #: Messages about invalid numbers in these elements name the attribute, but not the tag.
-#: For other elements, the message also names the element.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.

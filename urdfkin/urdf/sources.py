@@ -165,7 +165,7 @@ def read_source(
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
     if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
-        source = _resolve_package_uri(*address)
+        source = _resolve_package_uri(source, *address)
     if is_xacro(source):
         return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
@@ -236,14 +236,14 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
     raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
 
 
-def _resolve_package_uri(name: str, path: str) -> Path:
+def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
     """Return the file of a `package://` or `model://` address; raise SourceError for an unknown package."""
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
             f"the package {name!r} is not found",
-            where=f"package://{name}/{path}",
+            where=uri,
             remedy="add the folder of the package to ROS_PACKAGE_PATH, or name the file by its path",
             question=QuestionsSection.PACKAGES_AND_MESHES,
         )

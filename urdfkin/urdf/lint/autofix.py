@@ -2,7 +2,7 @@
 
 A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new file if three conditions hold:
 
-- Each fix reduces the number of findings by at least one.
+- The number of findings falls by at least the number of fixes.
 - The new file has no new findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
