@@ -5,7 +5,7 @@ vector, so one call computes a whole batch.
 
 `length_equations` computes the scale of a result: an upper bound on the sum of the absolute values of its
 terms. The scale is at least as large as every term, every partial sum and the result. Rounding errors are
-proportional to the scale. The result itself is small where large terms cancel.
+proportional to the scale. The result can be much smaller than the scale, because large terms can cancel.
 
 | Result | Scale |
 |---|---|

@@ -223,7 +223,7 @@ def _check_snapped_axis(
 
 
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) by which Pinocchio rotates the axis of a joint, by joint name.
+    """Return, by joint name, the angle (rad) between the axis in the file and Pinocchio's axis.
 
     A joint has no entry if Pinocchio keeps the axis, or rotates the axis by at most 2^-52 rad.
     """
