@@ -184,6 +184,8 @@ def test_robots_are_the_names_that_load_knows() -> None:
     assert urdfkin.robots("text") == ("one_link", "planar_two_link", "polar", "elbow")
     with pytest.raises(urdfkin.UnknownNameError, match="unknown family 'arms'; did you mean arm"):
         urdfkin.robots("arms")
+    with pytest.raises(urdfkin.InputError, match="family must be a name"):
+        urdfkin.robots(["arm"])  # type: ignore[arg-type]
 
 
 def test_findings_are_an_ordinary_list() -> None:

@@ -71,6 +71,8 @@ def test_a_package_address_is_a_file_or_an_error(write: Write, monkeypatch: pyte
     assert (read.data, read.source) == (b"<robot/>", str(path))
     with pytest.raises(SourceError, match=r"^package://nowhere/arm.urdf: the package 'nowhere' is"):
         read_source("package://nowhere/arm.urdf")
+    with pytest.raises(SourceError, match=r"^model://nowhere/arm.urdf: the package 'nowhere' is"):
+        read_source("model://nowhere/arm.urdf")
 
 
 def test_no_name_of_the_catalogue_contains_a_dot_or_a_separator() -> None:

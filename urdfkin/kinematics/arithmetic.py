@@ -19,7 +19,9 @@ VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transp
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Replace functions in a copy of `equations`.
+    """Return copies of the functions in `equations` that call the functions `vectors` instead of their own.
+
+    The keys of `vectors` are names of functions in `equations`. `decorate` is applied to each copy.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -31,13 +33,14 @@ def bind_equations(
 def rebind_functions(
     *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], replacements: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Copy all functions of the modules.
+    """Return copies of all functions of the modules, by name.
 
     The copies call other copies and the replacements.
 
     Args:
-        modules: For example, `recursion, outputs`, because `outputs` imports `recursion`.
-        decorate: Decorator of each copy.
+        modules: A module comes after the modules from which it imports functions, for example
+            `recursion, outputs`.
+        decorate: Decorator of each copy. A replacement of a copied function is not decorated.
         replacements: Functions or modules by name.
     """
     copies: dict[str, Any] = {}

@@ -22,7 +22,7 @@ section "vectors".
 | `b` | for such a joint: time derivatives of the components of o or u |
 
 All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
-own axes. In the link's own axes, z is (0, 0, 1) and d is constant.
+own axes. In the link's own axes, z and the offset of an `<origin>` are constant.
 
 The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
 and follows joint i. In a URDF, the frame of a joint lies on the joint's own axis. The `<origin>` of joint i

@@ -121,7 +121,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Write a term, column or matrix as LaTeX."""
+    """Return a term, column (tuple of terms) or matrix (tuple of rows) as LaTeX."""
     if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

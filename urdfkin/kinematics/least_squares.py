@@ -36,12 +36,17 @@ def least_squares(
     max_step: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Search near `start` for the smallest residuals.
+    """Search near `start` for a state with the smallest norm of the residuals.
 
-    The result is the best state and the norm of the residuals.
-    derivatives(...)[i, j] = -d(residual i)/d(parameter j).
-    No component of a step exceeds `max_step` in absolute value.
-    The search ends after `patience` consecutive slow steps; 0 means no limit.
+    Return the best state and the norm of its residuals.
+
+    Args:
+        start: First state.
+        residuals: Returns the residuals (n,) of a state, and a value for `derivatives`.
+        derivatives: Returns the matrix with the entries -d(residual i)/d(parameter j).
+        move: Returns the state after a step (parameters,).
+        max_step: Upper bound on the absolute value of each component of a step.
+        patience: The search ends after this number of consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

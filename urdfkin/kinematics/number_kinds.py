@@ -5,7 +5,7 @@ vector, so one call computes a whole batch.
 
 `length_equations` computes the scale of a result: an upper bound on the sum of the absolute values of its
 terms. The scale is at least as large as every term, every partial sum and the result. Rounding errors are
-proportional to the scale. The result itself is small where large terms cancel.
+proportional to the scale. The result can be much smaller than the scale, because large terms can cancel.
 
 | Result | Scale |
 |---|---|
@@ -49,9 +49,7 @@ Length = Any
 
 
 def product(x: Length, y: Length) -> Length:
-    """Return the product x y of two lengths.
-
-    The product of nonzero numbers is at least `SMALLEST_NORMAL`.
+    """Return the product x y of two lengths; for nonzero numbers, at least `SMALLEST_NORMAL`.
 
     >>> product(1e-200, 1e-200) == SMALLEST_NORMAL, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
     (True, 0.0, array([6.]))
@@ -67,9 +65,7 @@ def product(x: Length, y: Length) -> Length:
 
 
 def magnitude(x: FloatArray) -> FloatArray:
-    """Return the absolute values |x|.
-
-    Every nonzero value becomes at least `SMALLEST_NORMAL`.
+    """Return the absolute values |x|; for nonzero numbers, at least `SMALLEST_NORMAL`.
 
     >>> magnitude(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST_NORMAL, 2.0]
     True
@@ -78,10 +74,7 @@ def magnitude(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths of vectors (..., n).
-
-    A length is 0 or at least `SMALLEST_NORMAL`.
-    """
+    """Return the lengths (...) of vectors (..., n); for nonzero vectors, at least `SMALLEST_NORMAL`."""
     return magnitude(
         np.hypot.reduce(x, axis=-1)
     )  # Squares could underflow or overflow, but np.hypot does not.

@@ -77,7 +77,7 @@ def skew(w: ArrayLike) -> FloatArray:
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the vector w of S(w) (7.26, 7.37).
 
-    |S + S^T| / 2 <= tolerance * |S|, where |.| is the largest absolute entry.
+    Raise InputError if |S + S^T| / 2 > tolerance * |S|, where |.| is the largest absolute entry.
     """
     S = as_matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -103,7 +103,7 @@ UNCHANGED_MATRIX_TOLERANCE = 1e-15
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the nearest rotation to a rounded rotation matrix.
 
-    M: a rotation matrix whose entries may be rounded to nine decimals
+    M: a rotation matrix with entries that may be rounded to nine decimals
     result = M - M (M^T M - I)/2, one Newton step (Bjorck and Bowie)
     M = U (I + E):  result = U (I - 3/2 E^2)
     |E| <= 3e-9
@@ -115,9 +115,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the nearest rotation.
-
-    The matrix must have a positive determinant.
+    """Return the rotation nearest to M, a matrix with a positive determinant.
 
     >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -127,7 +125,7 @@ def polar_factor(M: FloatArray) -> FloatArray:
 
 
 def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
-    """Return a rotation matrix whose third column is `axis`.
+    """Return a rotation matrix with the third column `axis`.
 
     | z of `axis` | result |
     |---|---|
@@ -249,7 +247,7 @@ def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate_quaternion(quat: ArrayLike) -> FloatArray:
-    """Return the conjugate (-q, q0)."""
+    """Return the conjugate (-q, q0) of a quaternion of any length."""
     conjugated: FloatArray = as_vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
@@ -292,11 +290,11 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate 7.57 by the fourth-order Runge-Kutta method.
+    """Integrate 7.57 by the fourth-order Runge-Kutta method; return the quaternions (n, ..., 4) at n times.
 
-    `quat` is the orientation at the first time. The `times` (s) increase.
-    A jump of `w` must be at one of the `times`.
-    No step evaluates `w` at one of the `times`.
+    `quat` is the orientation at the first time. The `times` (s) increase. `w(t)` is the angular velocity
+    (rad/s), expressed in `frame`. A jump of `w` must be at one of the `times`, because no step evaluates `w`
+    at one of the `times`.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -329,7 +327,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Compute 7.57 for a quaternion with |quat| != 1."""
+    """Compute 7.57 for a quaternion of any length except 0."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
@@ -460,10 +458,7 @@ def _make_sequence(name: str) -> EulerSequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz.
-
-    The constant entries are exactly 0 and 1.
-    """
+    """Return Rx, Ry or Rz for the axis 0, 1 or 2; the constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -497,10 +492,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     | proper, such as ZYZ | [0, pi] |
     | other | [-pi/2, pi/2] |
 
-    At the singularity, only the sum or difference of the
-    first and third angle is determined.
-    At the singularity of moving axes, the third angle follows from the first angle.
-    At the singularity of fixed axes, the first angle follows from the third angle.
+    At the singularity, only the sum or difference of the first and third angle is determined. For moving
+    axes, the first angle is arbitrary (0 for exact entries of R), and the third angle completes the rotation.
+    For fixed axes, the third angle is arbitrary, and the first angle completes the rotation.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.
@@ -619,6 +613,8 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
 
         singular values of Omega:  1, sqrt(1 + cos d), sqrt(1 - cos d)
         condition number:          cot(d/2)
+
+    The singularity itself, d = 0, raises RepresentationSingularityError.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

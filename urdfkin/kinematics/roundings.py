@@ -349,8 +349,8 @@ def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
         PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps
 
-    Both arguments describe the path: `joints` is the number of joints,
-    and `tilt` is the sum of the joints' tilts, rad.
+    `joints` is the number of joints of the path plus the additional joints that the caller counts, for
+    example 1 as for `PINOCCHIO_ROUNDINGS`. `tilt` is the sum of the tilts (rad) of the path's joints.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]
@@ -359,16 +359,15 @@ def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def table_roundings(rows: int) -> float:
-    """Return the largest rounding error of a table's pose.
+    """Return an upper bound (eps) on the rounding error of a table's pose.
 
-    Returns:
-        Error without rounded joint values, eps.
+    The bound does not include the rounding of the joint values.
     """
     return ROW_ROUNDINGS * (rows + 1)
 
 
 def written_urdf_roundings(rows: int) -> float:
-    """Return the allowed difference between the poses of a table and of its URDF.
+    """Return the allowed difference (eps) between the poses of a table and of its URDF.
 
     The URDF was written from the table:
 
@@ -377,19 +376,13 @@ def written_urdf_roundings(rows: int) -> float:
     | pose of the table | 1 |
     | Pinocchio's pose of the URDF | 1 |
     | conversion to roll, pitch and yaw | 2 |
-
-    Returns:
-        Difference in eps.
     """
     return 4.0 * table_roundings(rows)
 
 
 def fitted_table_roundings(rows: int) -> float:
-    """Return the allowed difference between the poses of a URDF and of the table fitted to the URDF.
+    """Return the allowed difference (eps) between the poses of a URDF and of the table fitted to the URDF.
 
     After the last iteration of the fit, the error of the pose is at most 12.5 * table_roundings(rows).
-
-    Returns:
-        Difference in eps.
     """
     return 12.5 * table_roundings(rows)

@@ -4,6 +4,7 @@
 |---|---|---|
 | Source | `sources`, `catalogue`, `xacro` | `UrdfText`: the bytes of a URDF and the name of the source |
 | Parser | `parser` | `RobotRecord` (in `records`), and a `Finding` (in `findings`) for each problem |
+| Check | `lint` | a `Finding` for each further problem |
 | Tree | `reader` | `KinematicTree` |
 | Writer | `writer` | URDF text |
 

@@ -45,7 +45,8 @@ class CatalogueEntry:
         mimic: Whether the mimic rules of the URDF are valid. If False, urdfkin ignores all
             mimic rules by default.
         mimic_problem: The reason why the mimic rules of the URDF are invalid; None if the rules are valid.
-        poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
+        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0; in
+            the pose `ready`, a joint with limits that exclude 0 is at the middle of its limits.
         is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
 
@@ -83,18 +84,19 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     """Return the robot names that `load` accepts.
 
     Args:
-        family: A family such as arm, biped, gripper, hand, humanoid, quadruped, or text (the robots of the
-            textbook). None selects all robots.
+        family: A family such as arm, biped, hand, humanoid, quadruped, or text (the robots of the textbook).
+            None selects all robots.
 
     Raises:
-        UnknownNameError: there is no such family.
+        UnknownNameError: the family does not exist.
+        InputError: `family` is not a string.
 
     >>> "panda" in robots("arm"), robots("text")
     (True, ('one_link', 'planar_two_link', 'polar', 'elbow'))
     """
     families = {entry.family for entry in catalogue().values()}
-    if family is not None and family not in families:
-        raise UnknownNameError("family", as_str(family, "family"), families)
+    if family is not None and as_str(family, "family") not in families:
+        raise UnknownNameError("family", family, families)
     return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 
@@ -144,7 +146,10 @@ def find_package(
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
-    """Return the folder of a package, or None; the docstring of this module describes the search."""
+    """Return the first folder of a package that `accepts` allows, or None.
+
+    The docstring of this module describes the search.
+    """
     if not name or name in (".", "..") or "\0" in name:
         return None
     found = filter(is_folder, _candidates(name, referring_file, environ))
@@ -196,7 +201,17 @@ class ResolvedDescription:
 
 
 def find_description(source: object) -> ResolvedDescription | None:
-    """Return the file of a robot in robot_descriptions, or None for any other source."""
+    """Return the file of a robot in robot_descriptions, or None for any other source.
+
+    `source` is the name of a description module, or the module itself. The name of a catalogue robot or of an
+    existing file gives None.
+
+    | Error | Cause |
+    |---|---|
+    | InputError | robot_descriptions is not installed, or the module has no robot file |
+    | UnknownNameError | an unknown name |
+    | SourceError | the import or download fails |
+    """
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or may_exist(Path(source)):
             return None

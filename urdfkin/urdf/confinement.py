@@ -7,6 +7,8 @@ the hook. A xacro file that controls the Python interpreter could circumvent the
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
+
+macOS does not limit the memory.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ class AllowedPaths:
     """The files that a confined process may read.
 
     Attributes:
-        roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
+        roots: Readable files, and folders with readable content, except hidden files and folders.
             The target of a symbolic link must also be in `roots` or in a folder of `roots`.
         package_folders: Folders with installed packages. A symbolic link in these folders may point to a
             package in any other folder. `colcon build --symlink-install` writes such links.
@@ -90,10 +92,7 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or is below `root` and not hidden.
-
-    A path is hidden if the name of a file or folder in the path, below `root`, begins with a dot.
-    """
+    """Return whether `path` is `root`, or is below `root` and no name below `root` begins with a dot."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -128,7 +127,10 @@ def limit_process(seconds: int) -> None:
 
 
 def confine(is_allowed: Callable[[str], bool]) -> None:
-    """From now on, allow this process to read only the files that `is_allowed` accepts."""
+    """From now on, refuse all audit events of this process except harmless events and reads of allowed files.
+
+    `is_allowed` receives the path of a file or folder. A refused event raises RefusedError.
+    """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:
         if event in _HARMLESS_EVENTS:

@@ -22,7 +22,7 @@ from urdfkin.urdf.xacro import find_arguments
 #: Functions of xacro that would reveal types and attributes.
 _FORBIDDEN_SYMBOLS = ("type", "vars")
 
-#: Test expression that xacro alone evaluates, and urdfkin refuses.
+#: An expression that xacro's own function evaluates, and urdfkin's function refuses.
 _TEST_EXPRESSION = "${(lambda: 1)()}"
 
 _TOO_MUCH_MEMORY = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"

@@ -62,7 +62,8 @@ class RefusedError(Exception):
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
     """Return the value of an expression that calls only `functions` and `_METHODS`.
 
-    Raise RefusedError for forbidden content, and SyntaxError for text that is not an expression.
+    Raise RefusedError for forbidden content, NameError for an unknown name, and SyntaxError for text that is
+    not an expression.
     """
     tree = ast.parse(expression.strip(), mode="eval")
     return _Evaluation(names, functions).value(tree.body)

@@ -2,7 +2,8 @@
 
 Line and column numbers do not count a byte order mark.
 
-A comment in a URDF can silence findings. The comment names the codes of the findings and gives a reason:
+A comment in a URDF can silence warnings and notes, but not errors. The comment names the codes of the
+findings and gives a reason:
 
     <!-- urdfkin: ignore[URDF601] the vendor's own digits -->
 
@@ -117,7 +118,10 @@ class Fix:
 
 
 def apply_fixes(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
-    """Return the fixed bytes and the applied fixes; a fix that overlaps an earlier fix is skipped."""
+    """Return the fixed bytes and the applied fixes, in file order.
+
+    A fix is skipped if it begins before the end of the previous applied fix. A byte order mark stays.
+    """
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     taken, end = list[Fix](), 0
     for fix in sorted(fixes, key=lambda fix: fix.edits[0].start):
@@ -163,14 +167,15 @@ class Finding:
         code: Code of the kind of problem, for example `URDF502`. Codes do not change between versions.
         severity: Error, warning or note.
         message: The problem in one clause, without a full stop.
-        found: The wrong text in the file, in quotes, or None.
+        found: The wrong text or value, for example `xyz="0 0 0"`, or None.
         remedy: The remedy, or None.
-        file: The name of the file as the user wrote it, or `<text>`, `<stdin>`.
+        file: The path of the file, or a name such as `<text>` or `<stdin>`. After the path of a xacro file
+            follows ` (expanded)`.
         line: Line number, from 1.
         column: Column number in characters, from 1.
-        element: The tag of the joint, link or other child of `<robot>` with the problem; None for the whole
-            file.
-        name: The name of the link, joint or material, or None.
+        element: The tag of the element with the problem: usually the child of `<robot>`, such as `joint`; a
+            tag of MJCF; or `prim` for USD. None for the whole file.
+        name: The name of this element, the path of the prim, or None.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
         other_lines: Line numbers of other findings with the same code. This finding represents the other
@@ -231,14 +236,14 @@ class Finding:
         """Text about the line numbers in `other_lines`, for example "also on lines 3, 7"."""
         others = tuple(sorted(set(self.other_lines) - {self.line}))
         if len(others) == len(self.other_lines):
-            return f"also on {_lines(others)}"
+            return f"also on {_line_numbers_text(others)}"
         here = ("this line",) if self.line in self.other_lines else ()
-        where = (*here, _lines(others)) if others else here
+        where = (*here, _line_numbers_text(others)) if others else here
         return f"{len(self.other_lines)} more on {' and '.join(where)}"
 
     @property
     def sentence(self) -> str:
-        """The finding in one line, without its position and code.
+        """The finding in one line, without its position, code and severity.
 
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
@@ -287,7 +292,7 @@ def format_counts(findings: Sequence[Finding]) -> str:
     return ", ".join(words) or "no findings"
 
 
-def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
+def _line_numbers_text(lines: tuple[int, ...], shown: int = 4) -> str:
     numbers = ", ".join(str(line) for line in lines[:shown])
     rest = f" and {len(lines) - shown} more" if len(lines) > shown else ""
     return f"line{'s' if len(lines) > 1 else ''} {numbers}{rest}"
@@ -297,7 +302,8 @@ class UrdfError(UrdfkinError, ValueError):
     """A URDF has errors. The message lists the first five errors, each with file, line and column.
 
     Attributes:
-        findings: All findings of the file, sorted by line, warnings and notes included.
+        findings: The findings of the file, including warnings and notes. If `load` raises the error, one
+            finding can represent several findings with the same code (`Finding.other_lines`).
 
     >>> import urdfkin
     >>> try:
@@ -328,7 +334,7 @@ class UrdfError(UrdfkinError, ValueError):
 
 
 class UrdfWarning(UserWarning):
-    """The class of the Python warnings that `urdfkin.load` issues about a robot's file.
+    """The class of the Python warnings that `urdfkin.load` issues about a robot's file or table.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.UrdfWarning, UserWarning)
@@ -429,7 +435,7 @@ MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 #: Kinematics does not use these elements.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: Maximum number of errors with the same code that are reported separately.
+#: With `fold`, the maximum number of errors with the same code that are reported separately.
 MAX_ERRORS_PER_CODE = 100
 
 #: Maximum number of findings with one code and severity that are stored completely.
@@ -463,8 +469,11 @@ class Reporter:
     _name_search_count: int = 0
     _replaced_characters: bool | None = None
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
-    _element: Element | None = None
-    _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
+    #: The last element that `_spans` read, and its result.
+    _cached_element: Element | None = None
+    _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
+    #: Elements of findings that are added before the call of `silence`, by the id of the finding.
+    _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(
         self,
@@ -514,6 +523,8 @@ class Reporter:
         )  # fmt: skip
         if reason is None:
             group.weighted_findings.append((finding, weight))
+            if element is not None and self.comments and not self.comment_index.comments:
+                self._elements_before_silence[id(finding)] = element
         else:
             self.silenced_findings.append((finding, reason))
 
@@ -525,8 +536,9 @@ class Reporter:
         self.comment_index = comment_index
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
+                elements = self._elements_before_silence
                 reasons = [
-                    (pair, comment_index.find_reason(code, pair[0].line, None))
+                    (pair, comment_index.find_reason(code, pair[0].line, elements.get(id(pair[0]))))
                     for pair in group.weighted_findings
                 ]
                 self.silenced_findings += [
@@ -571,9 +583,9 @@ class Reporter:
 
     @property
     def has_replaced_characters(self) -> bool:
-        """Whether an attribute value contains a tab, a line end or a reference such as `&amp;`.
+        """Whether an attribute value may contain a tab, a line end or a reference such as `&amp;`.
 
-        XML parsers replace these characters.
+        XML parsers replace these characters. The search also finds such text outside tags.
         """
         if self._replaced_characters is None:
             self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
@@ -585,9 +597,10 @@ class Reporter:
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
     def _spans(self, element: Element) -> dict[str, _AttributeSpan]:
-        if self._element is not element:
-            self._element, self._attributes = element, dict(_attributes(self.data, element))
-        return self._attributes
+        if self._cached_element is not element:
+            self._cached_element = element
+            self._cached_spans = dict(_find_attribute_spans(self.data, element))
+        return self._cached_spans
 
     def _locate(self, element: Element, attribute: str | None) -> tuple[int, int, int]:
         span = None if attribute is None else self._spans(element).get(attribute)
@@ -603,7 +616,10 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), max_rotation)
 
     def make_removal_fix(self, element: Element, *attributes: str) -> Fix | None:
-        """Return the fix that removes attributes."""
+        """Return the fix that removes attributes and the white space before them.
+
+        Return None if the element has none of these attributes.
+        """
         existing = [span for name in attributes if (span := self._spans(element).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         edits = tuple(Edit(start_of_blanks(self.data, start), end) for start, end in spans)
@@ -636,9 +652,7 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Pattern of an attribute value with a tab, line end or reference.
-#: A reference is, for example, `&amp;`.
-#: XML parsers replace tabs, line ends and references in attribute values.
+#: Beginning of an attribute value with a tab, line end or reference such as `&amp;`.
 #: Possessive quantifiers keep the matching time linear.
 _REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
@@ -646,7 +660,7 @@ NEWLINE = re.compile(rb"\r\n|\r|\n")
 _BLANKS_TO_LINE_END = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
-def _attributes(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:
+def _find_attribute_spans(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:
     tag = START_TAG.match(data, element.offset)
     if tag is None:
         return
@@ -670,10 +684,7 @@ def _sort_key(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
-    """Combine the findings of a group.
-
-    In the last returned finding, `other_lines` has the line numbers of the findings that are not returned.
-    """
+    """Return some findings; `other_lines` of the last has the line numbers of all others."""
     group.weighted_findings.sort(key=lambda pair: _sort_key(pair[0]))
     findings = [finding for finding, _ in group.weighted_findings]
     into_one = fold and group.severity is not Severity.ERROR

@@ -1,8 +1,10 @@
-"""Convert objects of other libraries to URDF: ElementTree, lxml, yourdfpy, and Pinocchio's Model.
+"""Convert objects of other libraries.
 
-urdfkin recognizes an object of yourdfpy or Pinocchio by the module name of the object's class. An object with
-the attributes `tag`, `attrib` and `iter` counts as an element of ElementTree or lxml. Therefore urdfkin does
-not import yourdfpy, lxml or Pinocchio to recognize an object.
+Objects of ElementTree, lxml and yourdfpy become URDF text. A Model of Pinocchio becomes a kinematic tree.
+
+urdfkin recognizes an object of yourdfpy or Pinocchio by the module names of its class and base classes. An
+object with the attributes `tag`, `attrib` and `iter` counts as an element of ElementTree or lxml. Therefore
+urdfkin does not import yourdfpy, lxml or Pinocchio to recognize an object.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ def convert_to_urdf(source: Any) -> tuple[str, str] | None:
     """Convert an object of yourdfpy, ElementTree or lxml to URDF text.
 
     Return the URDF text, and the name that messages use for the object: `<yourdfpy>` or `<ElementTree>`.
-    Return None for an object of another library.
+    Return None for an object of another library. Raise InputError if the object cannot be written.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"
@@ -64,7 +66,10 @@ def convert_to_urdf(source: Any) -> tuple[str, str] | None:
 
 
 def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a finding if yourdfpy (0.0.60), which ignores quat_xyzw, may have lost rotations."""
+    """Return a note if a joint of a yourdfpy robot has an origin without rotation, otherwise ().
+
+    yourdfpy (0.0.60) ignores quat_xyzw, so the rotation in the file may be lost.
+    """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
         return ()
@@ -88,7 +93,8 @@ def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
 def convert_yourdfpy_robot(robot: yourdf.Robot) -> str:
     """Return the URDF of a yourdfpy robot; yourdfpy's own writer (0.0.60) omits mimic rules.
 
-    The axes are not normalised, so that `check` can report their lengths.
+    The axes are not normalised, so that `check` can report their lengths. Raise InputError if a value is
+    missing or invalid.
     """
     try:
         records = [_make_joint_record(joint) for joint in robot.joints]
@@ -134,7 +140,7 @@ def _serialize(root: Any) -> str:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-#: Names of Pinocchio's joint classes whose axis is x, y or z.
+#: Names of Pinocchio's joint classes with the axis x, y or z.
 #: R is a revolute joint, and P is a prismatic joint.
 #: RUB is a revolute joint without limits.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
@@ -174,7 +180,12 @@ def is_pinocchio_model(source: object) -> TypeGuard[Any]:
 
 
 def convert_pinocchio_model(source: Any) -> ConvertedModel:
-    """Convert a `Model` or `RobotWrapper`; raise InputError if URDF lacks the type of a joint."""
+    """Convert a `Model` or `RobotWrapper`.
+
+    A revolute joint without finite limits becomes continuous. A prismatic joint gets
+    `FALLBACK_PRISMATIC_LIMIT` for each missing limit. Raise InputError for a mimic joint, and for a joint
+    type that URDF lacks.
+    """
     model = getattr(source, "model", source)
     return _ModelReader(model).convert()
 
@@ -198,7 +209,7 @@ class _ModelReader:
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
-        """For each body whose frame is a joint frame, yield the index of the joint and of the body.
+        """For each body with the frame of a joint, yield the index of the joint and of the body.
 
         The bodies are in reverse order. In a dictionary of the pairs, the first body of a joint therefore
         replaces the later bodies of the joint.
@@ -208,10 +219,7 @@ class _ModelReader:
                 yield int(self.frames[i].parentJoint), i
 
     def convert(self) -> ConvertedModel:
-        """Convert all frames, then all moving joints.
-
-        In Pinocchio, the index of a parent frame is lower than the indices of its child frames.
-        """
+        # In Pinocchio, the index of a parent frame is lower than the indices of its child frames.
         for i in range(len(self.frames)):
             self._convert_frame(i)
         frames = zip(self.frames, self.kinds, strict=True)

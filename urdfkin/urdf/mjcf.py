@@ -116,7 +116,10 @@ class Mjcf:
         return full
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`."""
+        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
+
+        If there is a fused model, its placements replace those of `model` for the frames that it contains.
+        """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
         if self.fused_model is not None:
@@ -251,7 +254,10 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
-    """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>."""
+    """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>.
+
+    The root element of a file must be in the first 65,536 bytes. An unreadable file gives False.
+    """
     if isinstance(source, bytes):
         return _ROOT_ELEMENT.match(source.decode("utf-8-sig", "replace")) is not None
     if is_text(source):
@@ -268,6 +274,8 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
     If `with_shapes` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files.
+    `name` is the name of the source in messages. Raise InputError if MuJoCo is not installed or refuses the
+    file, or if the tree cannot represent a joint.
     """
     mujoco = import_mujoco()
     fused_model = None
@@ -318,7 +326,6 @@ def _load_spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
 
 
 def _find_aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield the free bodies whose frames MuJoCo aligns with their inertial frames."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -390,7 +397,7 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
 
 
 def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
-    """Yield a finding if a file declares degrees, but all its hinge limits are probably in radians."""
+    """Yield a remark if the hinge limits of a file in degrees are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
     if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
@@ -412,10 +419,8 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # The next loop replaces all inertias by placeholders.
         # With `align`, MuJoCo would move a free body's frame to its inertial frame.
-        # The inertia is only a placeholder.
-        # Therefore, `align` is switched off.
+        # The next loop replaces all inertias by placeholders, so `align` is switched off.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -464,7 +469,7 @@ class _MjcfReader:
             if name := m.site(i).name:
                 link = make_unique(name, self._used_link_names)
                 self.frames[link] = "site", i
-                T = _pose(m.site_pos[i], m.site_quat[i])
+                T = _pose_from_quaternion(m.site_pos[i], m.site_quat[i])
                 self._add_fixed_joint(T, self._links[m.site_bodyid[i]], link)
         rules = dict(self._read_rules())
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in self._joints]
@@ -476,7 +481,7 @@ class _MjcfReader:
 
     def _add_body(self, i: int) -> None:
         m, here = self.model, self._links[self.model.body_parentid[i]]
-        T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
+        T, link = _pose_from_quaternion(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
             what = "a mocap body is fixed at its pose in the file"
             self.remarks.append(MjcfRemark(what, f"body {link}", moves=True))
@@ -612,5 +617,5 @@ def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
     return rule
 
 
-def _pose(p: FloatArray, quaternion: FloatArray) -> FloatArray:
+def _pose_from_quaternion(p: FloatArray, quaternion: FloatArray) -> FloatArray:
     return pose(rotation_from_quaternion(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)

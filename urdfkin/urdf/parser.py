@@ -1,8 +1,9 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
 The XML parser is expat, which reports the position of every start tag, keeps namespace prefixes, parses deep
-nesting without recursion, and opens no file. If a document type declaration defines entities or refers to an
-external file, parsing stops with an error. No entity is expanded.
+nesting without recursion, and opens no file. If a document type declaration has brackets or refers to an
+external file, parsing stops with an error. Therefore, only the entities of XML itself are expanded, for
+example `&amp;`.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
 finding.
@@ -25,6 +26,7 @@ from urdfkin.urdf.findings import (
     COMMENT_MARK,
     ERROR,
     MAX_QUOTE_LENGTH,
+    NEWLINE,
     NOTE,
     REFUSES,
     WARNING,
@@ -150,9 +152,9 @@ def _find_codec(name: str) -> str | None:
 
 
 def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
-    """Return the line and the column of a byte; both start at 1."""
-    before = data[: max(offset, 0)].decode("utf-8", "replace")
-    return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+    """Return the line and the column (in characters) of a byte; both start at 1."""
+    lines = NEWLINE.split(data[: max(offset, 0)])
+    return len(lines), len(lines[-1].decode("utf-8", "replace")) + 1
 
 
 # -- XML elements
@@ -188,7 +190,10 @@ class _StopError(Exception):
 
 
 def read_document(report: Reporter) -> Element | None:
-    """Parse the file of `report` and return its root element; None after an error."""
+    """Parse the file of `report` and return its root element; None after an error.
+
+    If the file is UTF-8, `report.data` becomes the text without a byte order mark.
+    """
     data, max_bytes = report.data, report.limits.bytes
     if len(data) > max_bytes:
         message = "the file is too large"
@@ -244,7 +249,6 @@ class _Builder:
         parser.SkippedEntityHandler = self.handle_skipped_entity
 
     def read(self, data: bytes) -> None:
-        """Parse the file in pieces, and refuse a tag, comment or instruction that is too long."""
         whole, size = memoryview(data), min(_CHUNK_SIZE, self.limits.markup)
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
@@ -335,10 +339,7 @@ class _Builder:
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration.
-
-        Stop if the declaration has brackets or refers to an external definition.
-        """
+        """Stop if the declaration has brackets or refers to an external definition; warn otherwise."""
         self.has_content = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -503,10 +504,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, max_length: int) -> bool:
-        """Report a number with more than `max_length` characters.
-
-        The conversion of a long text to a number takes quadratic time.
-        """
+        """Report a number that is too long; the conversion of a long text takes quadratic time."""
         if len(written) <= max_length:
             return False
         found = f"{quote(written, 30)} of {len(written)} characters, more than {max_length}"
@@ -549,7 +547,6 @@ class NumberReader:
 
 
 #: Messages about invalid numbers in these elements name the attribute, but not the tag.
-#: For other elements, the message also names the element.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
@@ -675,7 +672,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def read_name(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; report a missing name."""
+    """Return the name of a link or joint; report a missing or empty name, and return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -711,8 +708,9 @@ class JointReader:
     ) -> str | None:
         """Return the value of a required attribute, and report a missing attribute.
 
-        If `number` is False, the function also reports an empty value. If `number` is True, `NumberReader`
-        reports an empty value.
+        `example` shows the attribute in the remedy. If `number` is False, the function also reports an empty
+        value. If `number` is True, `NumberReader` reports an empty value. Return None for a missing or empty
+        value.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -850,6 +848,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
+    """Return the name in `known` that is most similar to `word`, or has the same letters; otherwise None."""
     # The cache must not store a name of several megabytes.
     return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 
@@ -864,5 +863,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: If a word has more characters than this number, the word is not similar to any tag or attribute of URDF.
+#: A word with more characters is not similar to any tag or attribute of URDF.
 _MAX_WORD_LENGTH = 32

@@ -23,7 +23,11 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
-    """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors."""
+    """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors.
+
+    If `mimic` is False, mimic joints move independently. `root_joint` is "floating", "planar" or None;
+    another value raises InputError.
+    """
     name = urdf.element.attributes.get("name", "")
     tree = build_tree(
         name, find_root_link(name, urdf.links, urdf.joints), make_joint_rows(urdf.joints, mimic=mimic)
@@ -36,7 +40,8 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with the names of its parent link and child link.
 
-    Raise InputError if mimic joints form a cycle, and UnknownNameError if a mimicked joint does not exist.
+    Raise InputError if mimic joints form a cycle or an axis has no direction, and UnknownNameError if a
+    mimicked joint does not exist.
     """
     rules = _mimic_rules(joints) if mimic else {}
     return [(_make_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
@@ -71,7 +76,7 @@ def _make_joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 
 
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
-    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length."""
+    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length except 0."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
     return rpy_of(rotation_from_quaternion(scaled / np.linalg.norm(scaled)))
 

@@ -53,8 +53,8 @@ class Element:
 
     Attributes:
         offset: Index of the start tag's first byte, without counting a byte order mark.
-        top_level_ancestor: The child of `<robot>` that contains this element; None for the children of
-            `<robot>`.
+        top_level_ancestor: The child of `<robot>` that contains this element; None for `<robot>` and its
+            children.
         text: The first characters of the text between the element's tags.
     """
 
@@ -108,7 +108,7 @@ AXIAL_TYPES = ("revolute", "continuous", "prismatic")
 
 @dataclass(slots=True)
 class LimitRecord:
-    """A `<limit>` element; the value of a missing attribute is None."""
+    """A `<limit>` element; the value of a missing or invalid attribute is None."""
 
     element: Element
     lower: float | None

@@ -1,7 +1,7 @@
 """Read the text of a robot from a source, and record how to load the robot again.
 
-A source is a path, a `package://` address, a catalogue name, text, bytes, an open file, or `-` for standard
-input.
+A source is a path, a `package://` or `model://` address, a catalogue name, text, bytes, an open file, or `-`
+for standard input.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Origin:
 
     Attributes:
         source: A path, a catalogue name, or `-` for standard input. If the source has no name, the value is
-            `<text>`, `<bytes>` or `<file>`.
-        table: Whether the robot was created from a Denavit-Hartenberg table.
+            a word in angle brackets, such as `<text>`, `<bytes>` or `<table>`.
+        table: Whether the robot was created from a Denavit-Hartenberg table or a product of exponentials.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are omitted.
     """
@@ -130,7 +130,7 @@ class UrdfText:
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
         source: The path or name with which the URDF can be read again. A source without a path or name has
-            the value `-`, `<text>`, `<bytes>` or `<file>`.
+            the value `-` or a word in angle brackets, such as `<text>`, `<bytes>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; empty for other sources.
     """
 
@@ -153,13 +153,19 @@ def read_source(
     `max_bytes` + 1 characters of an open text file. If the function reads more than `max_bytes` bytes or
     characters, the source is too long.
 
-    A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`. Raise
-    SourceError for an unreadable file, UnknownNameError for an unknown name, and InputError for a wrong type.
+    A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
+
+    | Error | Cause |
+    |---|---|
+    | SourceError | an unreadable file, or an unknown package |
+    | UnknownNameError | an unknown name, or an unknown xacro argument |
+    | XacroError | xacro cannot expand the file |
+    | InputError | a wrong type, an empty name, or `xacro_args` without a .xacro file |
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
     if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
-        source = _resolve_package_uri(*address)
+        source = _resolve_package_uri(source, *address)
     if is_xacro(source):
         return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
@@ -230,14 +236,14 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
     raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
 
 
-def _resolve_package_uri(name: str, path: str) -> Path:
-    """Return the file of a `package://` address; raise SourceError for an unknown package."""
+def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
+    """Return the file of a `package://` or `model://` address; raise SourceError for an unknown package."""
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
             f"the package {name!r} is not found",
-            where=f"package://{name}/{path}",
+            where=uri,
             remedy="add the folder of the package to ROS_PACKAGE_PATH, or name the file by its path",
             question=QuestionsSection.PACKAGES_AND_MESHES,
         )

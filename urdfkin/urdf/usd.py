@@ -2,8 +2,8 @@
 
 - A prim with `PhysicsRigidBodyAPI` becomes a link; the scale of the prim's frame is removed. A plain `Xform`
   prim below a body also becomes a link; a fixed joint connects this link with the body.
-- A joint prim contains the pose A of the joint frame in the first body, and the pose B of the joint frame in
-  the second body. With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
+- A joint prim contains two poses of the joint frame: pose A in the first body, and pose B in the second body.
+  With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
   If the second body is the parent in the tree, urdfkin uses the inverse, B J(q)^-1 A^-1. To compute the
   inverse, urdfkin exchanges A and B and reverses the joint axis.
 - Lengths are multiplied by `metersPerUnit`, and angles are converted from degrees. If the up axis is Y, the
@@ -82,7 +82,7 @@ _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):refer
 #: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of joint types that a kinematic tree cannot represent.
-#: OpenUSD recognizes such types only with a plugin.
+#: OpenUSD recognizes gear joints and rack-and-pinion joints only with a plugin.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: USD attributes with the nonlinear coefficients of MuJoCo's joint equality.
 #: URDF mimic rules are linear.
@@ -150,7 +150,7 @@ class Usd:
         rest_poses: (n, 4, 4) poses of the prims in the world, in the order of `prims`, in m with z up.
             UsdGeom computes the poses.
         rest_q: (nq,) configuration in which the links have the poses `rest_poses`. For planar and floating
-            joints, `rest_q` contains the zero configuration.
+            joints, `rest_q` contains the neutral configuration.
         single_rounding_terms: Five numbers for each joint, by joint name. The numbers bound the effect of
             rounding to single precision:
 
@@ -193,7 +193,10 @@ def import_openusd() -> Any:
 def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage.
 
-    The function checks the references of each layer before OpenUSD follows the references.
+    The function checks the references of each layer before OpenUSD follows the references. Raise InputError
+    for a forbidden reference, value clips, a Git LFS pointer, a layer that OpenUSD does not accept, and more
+    than 1,000 layers. Raise SourceError for an unreadable file, and if the files together have more than
+    `MAX_BYTES` bytes.
     """
     allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
@@ -285,7 +288,15 @@ def read_usd(
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
-    that has the variant set. `articulation` is the path or name of the articulation to read.
+    that has the variant set. `articulation` is the path or name of the articulation to read, or the path of a
+    prim above several articulations. `name` is the name of the stage in messages.
+
+    | Error | Cause |
+    |---|---|
+    | UnknownNameError | an unknown variant set, variant or articulation |
+    | InputError | OpenUSD is not installed, or does not accept the file |
+    | InputError | the stage has no robot, an unsupported joint, or a forbidden reference |
+    | InputError | the stage has several articulations, and `articulation` is None |
     """
     pxr = import_openusd()
     try:
@@ -380,7 +391,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read a stage.
+    """Reader of one stage.
 
     Attributes:
         source: Name of the stage in messages.
@@ -518,7 +529,10 @@ class _StageReader:
         return None
 
     def _world_pose(self, prim: Any) -> tuple[FloatArray, FloatArray]:
-        """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,)."""
+        """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,).
+
+        A reflection gives three negative scales.
+        """
         self._report_timed_transforms(prim)
         where = f"{self.source}: {prim.GetPath()}"
         M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
@@ -633,10 +647,8 @@ class _StageReader:
             length_A + length_B,
             (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
         )
-        # A and B are poses relative to a body or a world.
-        # In this world, z is up.
-        # `UsdJoint` contains poses relative to a body or the stage's world.
-        # In the stage's world, y may be up.
+        # A and B are poses in a body, or in a world with z up.
+        # `UsdJoint` contains poses in a body, or in the stage's world, in which y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             directions, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -1003,7 +1015,7 @@ class _StageReader:
             yield joint, here, there
             return
         # In a URDF, joint and child link have the same frame.
-        # If a USD joint's frame is not its child's, the joint moves an additional link.
+        # If the frames of a USD joint and its child differ, the joint moves an additional link.
         # A fixed joint connects the additional link with the child link.
         between = make_unique(f"{name}_link", self._used_link_names)
         yield joint, here, between
@@ -1236,7 +1248,7 @@ def _rounding(x: FloatArray) -> FloatArray:
 
 
 def _quaternion_rounding(xyzw: FloatArray) -> float:
-    """Return a bound (rad) on the error of a rotation whose quaternion is rounded to single precision.
+    """Return a bound (rad) on the error of a rotation from a quaternion rounded to single precision.
 
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a

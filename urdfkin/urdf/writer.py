@@ -23,6 +23,9 @@ def to_urdf(tree: KinematicTree) -> str:
 
     URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The function does not write
     infinite limits. If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
+
+    Raise InputError for a revolute or prismatic joint without finite position limits, and for a name with a
+    character that XML does not allow.
     """
     version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{escape_attribute(tree.name)}"{version}>']

@@ -3,8 +3,8 @@
 A xacro file is a program, and may come from an untrusted source. docs/xacro.md lists the operations that a
 xacro file may do. The module `expanding` contains the code of the separate process.
 
-xacro itself ignores an argument that the file does not declare, but urdfkin raises an error. If urdfkin
-cannot read one of the included files, every argument is accepted.
+xacro itself ignores an argument that the file neither declares nor uses, but urdfkin raises an error. If
+urdfkin cannot read one of the included files, every argument is accepted.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 
 
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
-    """Return the argument names of a xacro file and its included files.
+    """Return the names of the arguments that a xacro file and its included files declare or use.
 
     Return None if one of the files cannot be found or read, or if there are over `MAX_SEARCHED_FILES` files.
+    Files with computed names count as not found.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
@@ -92,8 +93,12 @@ class XacroError(UrdfkinError):
 def expand(path: Path, arguments: Mapping[str, str], *, timeout: float = EXPANSION_TIMEOUT) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
-    Raise SourceError for a missing file, UnknownNameError for an undeclared argument, and XacroError if
-    xacrodoc is not installed or the expansion fails.
+    | Error | Cause |
+    |---|---|
+    | SourceError | a missing file |
+    | UnknownNameError | an argument that the file neither declares nor uses |
+    | XacroError | xacrodoc is not installed |
+    | XacroError | the expansion fails, or takes more than `timeout` seconds |
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))

@@ -193,6 +193,12 @@ def test_the_nearest_comment_silences_a_finding_and_all_other_comments_are_unuse
     assert (unused.code, unused.line) == ("URDF121", 1)
 
 
+def test_a_comment_before_an_element_silences_a_finding_about_deep_nesting_inside() -> None:
+    text = arm(more="{}<gazebo>" + "<a>" * 300 + "</a>" * 300 + "</gazebo>")
+    assert [finding.code for finding in check(text.format(""))] == ["URDF109"]
+    assert check(text.format("\n" + COMMENT.format("URDF109"))) == []
+
+
 @pytest.mark.slow
 def test_findings_beyond_the_number_of_stored_ones_are_also_silenced() -> None:
     text = urdfs.robot(

@@ -1,8 +1,8 @@
 """Apply automatic fixes to a URDF, check that the robot does not change, and write the changes as a patch.
 
-urdfkin accepts a fix if three conditions hold:
+A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new file if three conditions hold:
 
-- The new file has fewer findings with the code of the fix.
+- The number of findings falls by at least the number of fixes.
 - The new file has no new findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
@@ -39,7 +39,7 @@ from urdfkin.urdf.sources import UrdfText
 #: A pass fixes findings of one code only.
 MAX_PASSES = 100
 
-#: Maximum angle (rad) by which rounding to doubles rotates a unit vector.
+#: Upper bound (rad) on the angle by which rounding to doubles rotates a unit vector.
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
@@ -63,8 +63,6 @@ def fix_text(
     choose: Callable[[], Callable[[Finding], bool]],
 ) -> FixResult:
     """Apply the automatic fixes, unless the file has a finding of severity error.
-
-    The fixes of one finding code, such as URDF507, are applied in one pass.
 
     `choose` is called before each pass, and returns a function that selects the findings to fix.
     """
@@ -147,10 +145,7 @@ _ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`.
-
-    The function computes with fractions, which have no rounding errors.
-    """
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`; fractions are exact."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)
@@ -179,7 +174,10 @@ _PATCH_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def make_patch(file: str, before: bytes, after: bytes, escape: Callable[[str], str]) -> str:
-    """Return the patch of one UTF-8 file; `escape` escapes the control characters of a text."""
+    """Return the patch of one UTF-8 file, or an empty text if `before` and `after` are equal.
+
+    `escape` escapes the control characters of a text.
+    """
     if before == after:
         return ""
     name = _relative_path(file)

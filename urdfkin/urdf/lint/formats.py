@@ -24,7 +24,11 @@ SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schem
 def as_sarif(
     findings: Sequence[Finding], version: str, silenced_findings: Sequence[tuple[Finding, str]] = ()
 ) -> str:
-    """Return a SARIF document with all rules about URDF files, and a result for each finding."""
+    """Return a SARIF document with all rules about URDF files, and a result for each finding.
+
+    Rules about MJCF and USD are included only if a finding has their code. A silenced finding is a result
+    with a suppression. Each pair in `silenced_findings` is a finding and the reason in the comment.
+    """
     codes = {finding.code for finding in findings}
     rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
@@ -108,7 +112,7 @@ def format_summary(findings: Sequence[Finding], files: int) -> str:
 def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield a line for each code. The code with the most findings comes first.
 
-    The mark `[*]` means that `--fix` fixes findings with this code.
+    The mark `[*]` means that `--fix` can fix at least one finding with this code.
     """
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
@@ -127,7 +131,10 @@ def as_json(
     version: str,
     silenced_findings: Sequence[tuple[Finding, str]] = (),
 ) -> str:
-    """Return the findings as a JSON document; positions in a `fix` are byte indices."""
+    """Return the findings as a JSON document.
+
+    Positions in a `fix` are byte indices. Byte 0 is the first byte after a byte order mark.
+    """
     document = {
         "schema": "urdfkin-findings",
         "version": JSON_VERSION,

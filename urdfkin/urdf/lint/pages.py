@@ -39,7 +39,7 @@ URDF_RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lam
 #: The rules about MJCF and USD files.
 MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
+#: Code of each rule about URDF files. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
 CODE_BY_NAME = {
     word: rule.id for rule in URDF_RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
 }
@@ -56,7 +56,8 @@ class Page:
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
             example begins with a joint or a comment, the links `base` and `tip` must be added.
         correction: The corrected example.
-        other_readers: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
+        other_readers: The behaviour of other readers for the example: Pinocchio (urdfdom) and yourdfpy for a
+            URDF, programs that read MJCF or USD for the other rules.
     """
 
     title: str
@@ -121,6 +122,8 @@ def find_rule(word: str) -> Rule:
 
 def find_rules(word: str) -> tuple[Rule, ...]:
     """Return the rules that a word selects: a code, a short name, the first digits of codes, or ALL.
+
+    Raise UnknownNameError if the word selects no rule.
 
     >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))
     (['URDF601'], 5)

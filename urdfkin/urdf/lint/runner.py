@@ -44,10 +44,12 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings, sorted by line.
 
-    The function also checks that the packages and mesh files in the URDF exist. No mesh is opened.
+    The function also checks that the packages and mesh files in the URDF exist. No mesh is opened. Mesh files
+    without a package are checked only if the source is a file.
 
     Args:
-        source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
+        source: A path, a `package://` address, a catalogue name, URDF text, bytes, an open file, or `-` for
+            standard input.
         limits: Limits on the size of the file, its elements, names and numbers.
         mimic: Whether mimic joints follow their mimicked joints. If False, the codes
             URDF520 to URDF527 are notes. The default is True, except for robots of the catalogue with invalid
@@ -55,9 +57,9 @@ def check(
         root_joint: `"floating"` or `"planar"` if you will load the robot with this argument.
         xacro_args: Arguments for a .xacro file, which is expanded first. Line numbers of findings are those
             of the expanded text.
-        fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
-            `fold` is True, at most 100 errors with one code are returned. The last of these errors lists the
-            lines of all further errors.
+        fold: Whether to combine four or more warnings or notes with one code into a single finding that lists
+            the lines. For the codes URDF7xx, two are enough. If `fold` is True, at most 100 errors with one
+            code are returned. The last of these errors lists the lines of all further errors.
 
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
@@ -66,10 +68,11 @@ def check(
         of all further findings.
 
     Raises:
-        SourceError: the file cannot be read.
-        UnknownNameError: the source is neither a file nor a catalogue name. The message lists the nearest
-            names.
-        InputError: the type of the source is wrong.
+        SourceError: the file cannot be read, or the package of a `package://` address is not found.
+        UnknownNameError: the source is neither a file nor a catalogue name, or a .xacro file has no argument
+            of this name. The message lists the nearest names.
+        InputError: an argument has a wrong type or value.
+        UrdfkinError: xacro cannot expand the file.
 
     >>> for finding in check('<robot name="r"><link name="base"/><link name="stray"/></robot>'):
     ...     print(finding)  # doctest: +ELLIPSIS
@@ -89,7 +92,7 @@ class Examination:
     """The result of a check; `robot` is None if the text is not a URDF.
 
     `data` has no byte order mark, and findings state positions in `data`. `silenced_findings` contains
-    silenced findings, each with the reason in the comment.
+    each silenced finding with the reason in the comment.
     """
 
     text: UrdfText

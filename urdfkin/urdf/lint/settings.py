@@ -1,6 +1,7 @@
 """Find the files and the settings for `urdfkin check`, and select the findings to report.
 
-Settings are in pyproject.toml. Files and patterns in the settings are relative to the folder of this file:
+Settings are in pyproject.toml. Files and patterns in the settings are relative to the folder of this file.
+Only the patterns of `include` are compared with file names:
 
     [tool.urdfkin]
     ignore = ["URDF601"]
@@ -8,10 +9,10 @@ Settings are in pyproject.toml. Files and patterns in the settings are relative 
     baseline = "urdfkin-baseline.json"
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
-A finding is reported if its code is selected and the finding is neither in the baseline nor in an older
-version of the file. A baseline is a JSON file with known findings. A finding is known if the baseline has an
-entry with the same file, code, severity, element, name and wrong text. Line numbers are not compared, so a
-finding is still known after you edit other lines.
+The settings select the codes of findings, and can hide notes. A selected finding is reported if it is neither
+in the baseline nor in an older version of the file. A baseline is a JSON file with known findings. A finding
+is known if the baseline has an entry with the same file, code, severity, element, name and wrong text. Line
+numbers are not compared, so a finding is still known after you edit other lines.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def relative_path(file: str, root: Path) -> str:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Read a baseline; raise InputError if the file is not a baseline."""
+    """Read a baseline; raise InputError if the file is not a baseline, SourceError if it cannot be read."""
     counts = Counter[BaselineKey]()
     try:
         document = json.loads(read_text(path))
@@ -155,7 +156,8 @@ class Settings:
 def find_settings(start: Path) -> Settings:
     """Return the settings of the nearest pyproject.toml with a table [tool.urdfkin], or empty settings.
 
-    The search goes upwards from `start`, up to the first folder that contains .git.
+    The search goes upwards from `start`, up to the first folder that contains .git. Raise InputError for an
+    invalid setting, UnknownNameError for an unknown setting, and SourceError if the baseline does not exist.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -284,9 +286,7 @@ def find_known_findings(
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # urdfkin cannot expand the older xacro file.
-        # All findings count as new after a change of the xacro file.
-        # The same applies to files that the xacro file may include.
+        # urdfkin cannot expand the older xacro file, so all findings are new after a change.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_XACRO_INCLUDE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)

@@ -33,6 +33,7 @@ CASES = [
     Case("latin1-undeclared", arm(base='<link name="base" f="\xf6"/>').encode("latin-1"), REJECT),
     Case("overlong-utf8", b"<robot name='\xc0\xaf'><link name='a'/></robot>", REJECT, "URDF102:1"),
     Case("zero-byte-at-the-end", _PLAIN.encode() + b"\0", REJECT, "URDF102:10"),
+    Case("zero-byte-after-returns", _PLAIN.replace("\n", "\r").encode() + b"\0", REJECT, "URDF102:10"),
     Case("declared-us-ascii", arm(head='<?xml version="1.0" encoding="US-ASCII"?>'), ACCEPT),
     Case("declared-utf8-small", arm(head="<?xml version='1.0' encoding='utf8'?>"), ACCEPT),
     Case("declared-cp1252-ascii", arm(head='<?xml version="1.0" encoding="cp1252"?>'), WARN),

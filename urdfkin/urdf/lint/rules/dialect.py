@@ -204,7 +204,7 @@ _SINGLE_CHILDREN = {
 #: Elements in which text between the tags is reported.
 _ELEMENTS_WITHOUT_TEXT = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
-#: Elements whose text probably belongs in an attribute.
+#: Elements with text that probably belongs in an attribute.
 _VECTOR_ELEMENTS = ("origin", "axis")
 
 
@@ -372,11 +372,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribu
 
 
 def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield the namespace prefixes in the attribute names and in the tag of an element.
-
-    The second value of a pair is the name of the attribute with the prefix, or None for the prefix of the
-    tag.
-    """
+    """Yield each namespace prefix with the name of the attribute; None for the prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

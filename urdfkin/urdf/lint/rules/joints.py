@@ -39,6 +39,7 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
+    """Return whether the joints connect all links in one tree."""
     edges = [joint for joint in robot.joints if _check_ends(report, robot, joint)]
     is_tree = len(edges) == len(robot.joints) and _check_loops_and_parents(report, robot, edges)
     return _check_root(report, robot) and is_tree and bool(robot.links)
@@ -222,16 +223,19 @@ def _check_snapped_axis(
 
 
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) by which Pinocchio rotates the axis of a joint, by joint name.
+    """Return, by joint name, the angle (rad) between the axis in the file and Pinocchio's axis.
 
-    A joint has no entry if Pinocchio does not change the axis.
+    A joint has no entry if Pinocchio keeps the axis, or rotates the axis by at most 2^-52 rad.
     """
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
 
 
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them."""
+    """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
+
+    Return None if Pinocchio keeps the axis, or if the angle is at most `_NEGLIGIBLE_TILT`.
+    """
     if axis is None:
         return None
     for i in range(3):
@@ -510,7 +514,7 @@ NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
+#: If the longest chain of a robot is shorter (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
 #: A limit is probably in degrees if it is a whole number, and
