@@ -294,7 +294,7 @@ def test_joints_of_a_pinocchio_model_without_an_equivalent_are_refused() -> None
 def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
     number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = conversions._model_placements
+    right = conversions._compute_model_placements
 
     def moved(*arguments: Any) -> Any:
         T = right(*arguments)
@@ -302,7 +302,7 @@ def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
         T[:, -1, *number] += 3e-13
         return T
 
-    monkeypatch.setattr(conversions, "_model_placements", moved)
+    monkeypatch.setattr(conversions, "_compute_model_placements", moved)
     with pytest.raises(OracleError, match=r"made from a pinocchio.Model differs from the model"):
         urdfkin.load(pin.buildModelFromUrdf(file("ur5")))
 
