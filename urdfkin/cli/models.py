@@ -126,8 +126,8 @@ def same_command(
     configuration in which the distance is at least the lower bound. The upper bound is proven for all
     configurations within the joint limits.
 
-    The numbers of a USD file are rounded to single precision. If no joint differs by more than this rounding
-    can cause, A and B are the same up to single precision.
+    The numbers of a USD file are rounded to single precision. If this rounding explains the difference of
+    each joint, A and B are the same up to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
     1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are

@@ -113,7 +113,7 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
     \b
     Example:
       urdfkin completion bash
-    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
+    """  # noqa: D301  click needs the character "\b"
     script = get_completion_class(shell)
     # The variable _URDFKIN_COMPLETE makes click print completions.
     say_file_content(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

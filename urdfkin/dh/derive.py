@@ -366,7 +366,7 @@ def _make_last_row(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Compute theta, d, a and alpha of the last row, and the tool.
 
-    `A` is the tip's pose in the last joint's frame, after a shift of this frame along z to O_{n-1}.
+    `A` is the tip's pose in a frame at O_{n-1} with the axes of the last joint's frame.
     """
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])

@@ -67,7 +67,7 @@ class ImportLock:
             return
         with self._lock:
             if not self._registered:
-                # The class docstring explains the import of `logging` before `os.register_at_fork`.
+                # `logging` must be imported before this call; the class docstring states the reason.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

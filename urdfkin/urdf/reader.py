@@ -106,8 +106,8 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return a rule for each mimic joint, by joint name. The mimicked joint of each rule is independent.
 
     Example of a chain: z mimics y, and y mimics the independent joint x. The returned rule of z is
-    z = m2 (m1 x + b1) + b2. Both urdfkin and Pinocchio start with the rule of y, then combine it with the
-    rule of z. Therefore the rounding errors of urdfkin and Pinocchio are equal.
+    z = m2 (m1 x + b1) + b2. urdfkin and Pinocchio combine the rules in the same order, from x to z.
+    Therefore, they have equal rounding errors.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

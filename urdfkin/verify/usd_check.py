@@ -44,7 +44,8 @@ TIMEOUT = 60.0
 #: Tolerance for the angle between OpenUSD's and urdfkin's frame of a joint:
 #: angle (rad) <= `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
-#: Number of rounding errors in a joint's origin; `_check_joint` derives this number.
+#: Tolerance for the origin of a joint's frame, in roundings to single precision.
+#: `_check_joint` derives this bound.
 _ORIGIN_ROUNDINGS = 3.0
 #: A prim's transform consists of operations, such as rotations.
 #: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.

@@ -46,7 +46,8 @@ _FIT_SEED, _CHECK_SEED = 1, 2
 #: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
 _MAX_CELLS_ERROR_FRACTION = 0.5
 #: If a table does not agree with the URDF, urdfkin searches for a mistake in the table.
-#: Accepted after the correction: tip error <= max(tolerance, this number * tip error before)
+#: A correction of a mistake is accepted if the corrected table agrees with the URDF.
+#: It is also accepted if the tip error is at most this fraction of the tip error without the correction.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: The cells that differ without a fit are reported only if:

@@ -269,7 +269,7 @@ class PrintedPrecision:
         proven = "" if self.bound is None else f"; the proven bound is {format_error_bound(self.bound)} m"
         condition = f"; this holds if {self.condition}" if self.condition else ""
         return (
-            f"printed with {self.digits} digits, the table gives the tip within"
+            f"printed with {self.digits} digits, the table reproduces the tip within"
             f" {format_error_bound(self.metres)} m of its exact position on {self.samples} samples"
             f"{proven}{condition}"
         )
