@@ -27,8 +27,9 @@ def find_similar_names(
 ) -> list[str]:
     """Return up to three known names that are similar to `word`, the most similar first.
 
-    The comparison ignores case. `cutoff` is the least similarity, from 0 to 1, as in
-    `difflib.get_close_matches`. The search ends after `work` compared pairs of characters.
+    The comparison ignores case and reads only the first 128 characters of a name. `cutoff` is the least
+    similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends before it compares more than
+    `work` pairs of characters.
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
@@ -179,7 +180,9 @@ class RangeError(InputError):
 
 
 class UnknownNameError(UrdfkinError, LookupError):
-    """A name does not exist; the message suggests similar existing names.
+    """A name does not exist.
+
+    The message suggests similar existing names. If no name is similar, it lists up to six existing names.
 
     Attributes:
         name: The unknown name.
@@ -238,9 +241,12 @@ class SourceError(UrdfkinError, OSError):
 
 
 class RepresentationSingularityError(InputError):
-    """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
+    """Euler angles are at their representational singularity (7.56), or too near to it.
+
+    At the singularity, some angular velocities correspond to no derivatives of the angles.
 
     Attributes:
+        sequence: The sequence of the Euler angles, as in the message.
         distance: Distance (rad) of the middle angle from its value at the singularity.
         sample: Index of the worst sample of a batch; () for a single sample.
     """
