@@ -2,7 +2,8 @@
 
 By default, the functions read only regular files. An untrusted folder may contain a link to an endless
 device, or a named pipe without a writer. A path from the user may be a pipe, such as `<(xacro arm.xacro)` in
-bash. A pipe is read with a timeout; Python's `open` would wait for ever.
+bash. The functions wait at most `PIPE_TIMEOUT` seconds for a writer of the pipe; Python's `open` would wait
+for ever.
 """
 
 from __future__ import annotations

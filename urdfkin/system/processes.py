@@ -2,7 +2,8 @@
 
 The current folder may contain untrusted files. With the options -c and -m, Python searches the current folder
 for modules first. Python would therefore run a file `json.py` beside a robot. Child processes of urdfkin
-therefore do not import from the current folder. Libraries also search the current folder for settings files.
+import only from folders with an absolute path in `sys.path`. Libraries also search the current folder for
+settings files.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ _EXTRA_VARIABLES = {"OPENBLAS_NUM_THREADS": "1"}
 def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
     """Return a command that runs code in a new interpreter.
 
-    The new interpreter imports from the folders of `sys.path`, except the current folder and Dask's temporary
-    folder.
+    The new interpreter imports from the absolute paths in `sys.path`, except Dask's temporary folder. It
+    imports from the current folder only if `sys.path` contains its absolute path, for example by PYTHONPATH.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_import_path()!r}; {code}"]
 
