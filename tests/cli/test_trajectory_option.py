@@ -322,5 +322,5 @@ def test_a_hundred_thousand_rows_are_read_computed_and_checked(tmp_path: Path) -
     rows, head = np.column_stack([t, np.sin(np.outer(t, np.arange(1, 7)))]), ["time", *robot.coordinate_names]
     np.savetxt(log, rows, delimiter=",", comments="", header=",".join(head))
     done = good("velocity ur5 --frame tool0 --trajectory", str(log), "-o", str(out))
-    assert f"{n} velocity results" in done.err
+    assert f"{n:,} velocity results" in done.err
     assert len(out.read_text().splitlines()) == n + 1

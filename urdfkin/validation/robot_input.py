@@ -1,7 +1,7 @@
 """The robots to validate, as plain data; `origin` and the digest of the text identify a robot.
 
 A robot from a file is represented by the path, so that thousands of robots take little memory.
-`RobotInput.read_text` raises InputError if the file has changed since the start of the validation.
+`RobotInput.load_text` raises InputError if the file has changed since the start of the validation.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class RobotInput:
     def label(self) -> str:
         return self.origin.source
 
-    def read_text(self) -> UrdfText:
+    def load_text(self) -> UrdfText:
         """Return the robot's text; raise InputError if the file's digest is not `sha256`."""
         if isinstance(self.source, bytes):
             return UrdfText(self.source, self.file, self.label, catalogue().get(self.label))
@@ -78,14 +78,14 @@ class RobotInput:
 
     def with_text(self) -> RobotInput:
         """Return a copy that contains the text, for other machines."""
-        text = self.read_text()
+        text = self.load_text()
         return replace(self, source=text.data, file=text.label)
 
     def make_robot(self) -> Robot:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
             robot = make_robot(
-                self.read_text(),
+                self.load_text(),
                 mimic=self.origin.mimic,
                 root_joint=self.origin.root_joint,
                 oracle=ORACLES[self.origin.oracle or PINOCCHIO.name].name,
