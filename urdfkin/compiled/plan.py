@@ -72,7 +72,7 @@ _MOTION_OF_KIND = {
 #: Motions of each kind of joint. A motion is a pair (axis, is_rotation).
 #: `axis`: 0 for x, 1 for y, 2 for z of the joint's frame.
 #: `is_rotation`: True for a rotation, False for a translation.
-_RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
+_AXIS_MOTIONS: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
     JointMotion.PLANAR: ((0, False), (1, False), (2, True)),
@@ -262,7 +262,7 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
     rows = [
         (row, axis, int(turns), step[StepField.V] + place)
         for row, step in enumerate(steps)
-        for place, (axis, turns) in enumerate(_RATES[JointMotion(step[StepField.KIND])])
+        for place, (axis, turns) in enumerate(_AXIS_MOTIONS[JointMotion(step[StepField.KIND])])
     ]
     columns = np.array(rows, dtype=np.int64).reshape(-1, len(ColumnField))
     return columns, geometry[columns[:, ColumnField.STEP], Geometry.MULTIPLIER].copy()
