@@ -12,7 +12,7 @@ number of threads.
 | `accelerations` | classical [linear; angular] | (n, frames, 6) | 7.129, 7.130 |
 | `jacobians` | Jacobian | (n, frames, 6, nv) | 7.85 |
 | `jacobian_rates` | time derivative of the Jacobian | (n, frames, 6, nv) | 7.126 |
-| `hessians` | [..., i, j]: derivative of column i along joint velocity j | (n, frames, 6, nv, nv) | |
+| `hessians` | [..., i, j]: derivative of column i with respect to joint motion j | (n, frames, 6, nv, nv) | |
 | `imus` | [proper acceleration; angular velocity], in frame axes | (n, frames, 6) | |
 """
 
@@ -52,7 +52,7 @@ from urdfkin.model.tree import FloatArray
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 #: Smallest size (bytes) of results that are written directly to memory.
-#: Such results do not fit into the caches.
+#: Results of this size do not fit into the caches.
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results.
 #: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.

@@ -25,8 +25,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: `_POSE_ROWS` are the scratch rows with the 16 elements of a pose.
-#: `_SIX_ROWS` are the scratch rows with the six numbers of a velocity or an acceleration.
+#: Scratch rows of the 16 elements of a pose, and of the six numbers of a velocity or an acceleration.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -47,7 +46,7 @@ def state_for_velocity(state):
 
 
 def state_for_acceleration(state):
-    """Mark the linear velocity as unused: the acceleration (7.130) does not need it."""
+    """Mark the linear velocity as unused, because no acceleration depends on it (7.129, 7.130)."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 

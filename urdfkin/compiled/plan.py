@@ -39,10 +39,13 @@ class JointMotion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`.
+    """First column of each part of `CompiledTree.geometry`.
 
     Attributes:
+        R: Rotation matrix from this joint's axes to the previous moving joint's axes, row by row.
         OFFSET: Vector from the previous moving joint to this joint, in the previous joint's axes.
+        MULTIPLIER: Multiplier of the mimic rule; 1 without a rule.
+        CONSTANT: Offset of the mimic rule; 0 without a rule.
     """
 
     R = 0
@@ -69,7 +72,7 @@ _MOTION_OF_KIND = {
 #: Motions of each kind of joint. A motion is a pair (axis, is_rotation).
 #: `axis`: 0 for x, 1 for y, 2 for z of the joint's frame.
 #: `is_rotation`: True for a rotation, False for a translation.
-_RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
+_AXIS_MOTIONS: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
     JointMotion.PLANAR: ((0, False), (1, False), (2, True)),
@@ -87,7 +90,7 @@ class CompiledTree:
     |---|---|---|
     | joints | | indices of the moving joints in the tree |
     | steps | (steps, 3) | integers of each moving joint; `StepField` names the columns |
-    | geometry | (steps, 14) | numbers of each moving joint; `Geometry` names the first columns |
+    | geometry | (steps, 14) | numbers of each moving joint; see `Geometry` |
     | frames | (frames, 2) | last moving joint (row in `steps`, or -1), index in the output; sorted |
     | offsets | (frames, 12) | rotation and translation from the last moving joint, in the order of `frames` |
     | columns | (columns, 4) | integers of each Jacobian column; `ColumnField` names the columns |
@@ -259,7 +262,7 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
     rows = [
         (row, axis, int(turns), step[StepField.V] + place)
         for row, step in enumerate(steps)
-        for place, (axis, turns) in enumerate(_RATES[JointMotion(step[StepField.KIND])])
+        for place, (axis, turns) in enumerate(_AXIS_MOTIONS[JointMotion(step[StepField.KIND])])
     ]
     columns = np.array(rows, dtype=np.int64).reshape(-1, len(ColumnField))
     return columns, geometry[columns[:, ColumnField.STEP], Geometry.MULTIPLIER].copy()
@@ -286,7 +289,7 @@ def _find_target_columns(columns: IntArray, parents: Sequence[int], ends: Sequen
 class Op(IntEnum):
     """Instructions of a program.
 
-    The suffix X, Y or Z names a coordinate axis. Such instructions are faster.
+    The suffix X, Y or Z names a coordinate axis. Instructions with a suffix are faster.
     """
 
     END = 0
@@ -344,9 +347,9 @@ LANES = 8
 #: the operation, three operands, and the index of the constants.
 INSTRUCTION_WIDTH = 5
 #: Number of integers that describe a joint angle in a program:
-#: 0: scratch row of the angle,
-#: 1: scratch row of the sine,
-#: 2: index of the mimic rule,
+#: 0: scratch row of the coordinate q,
+#: 1: scratch row of the sine; the next row contains the cosine,
+#: 2: index of the mimic rule's constants,
 #: 3: 0 if the angle is q, 1 if the angle is multiplier * q + offset.
 ANGLE_WIDTH = 4
 #: Scratch rows. Row 0: number 0. Row 1: number 1.
@@ -639,7 +642,7 @@ class KernelArgs(IntEnum):
 
 
 def address(x: NDArray[Any]) -> int:
-    first: int = x.__array_interface__["data"][0]  # `x.ctypes.data` is slower, because it runs Python code.
+    first: int = x.__array_interface__["data"][0]  # `x.ctypes.data` runs Python code, which is slower.
     return first
 
 

@@ -2,14 +2,14 @@
 
 Numba is imported only when a kernel is loaded or compiled. For a few configurations, plain Python takes less
 time than loading or compiling a kernel. For each kernel, this module therefore adds up the time (s) that
-plain Python has taken. The table lists what this module does when the sum passes a threshold. The sum then
-also includes the estimated time of the next computations in plain Python.
+plain Python has taken. The estimated time of the next computations in plain Python is added. The table lists
+the action when this sum reaches a threshold.
 
 | time in plain Python | action |
 |---|---|
-| more than `LOAD_AFTER` | read the kernel from disk |
-| more than `BACKGROUND_AFTER`, no kernel on disk | compile it in a second process; Python still computes |
-| more than `COMPILE_AFTER`, no kernel on disk | compile it in this process |
+| `LOAD_AFTER` for the first kernel, then `_LOAD_NEXT_AFTER` | read the kernel from disk |
+| `BACKGROUND_AFTER`, no kernel on disk | compile it in a second process; Python still computes |
+| `COMPILE_AFTER`, no kernel on disk | compile it in this process |
 
 If no second process can compile the kernel, this process compiles it after the time `BACKGROUND_AFTER`.
 """
@@ -99,7 +99,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single_evaluator(name: str) -> bool:
     """Return whether to load the kernel `one_configuration`.
 
-    Each call adds the time that this kernel could have saved.
+    The answer is False until a batch kernel of the quantity `name` is loaded. Each later call adds the time
+    that `one_configuration` could have saved.
     """
     if _modes:
         return _modes[-1] == "compiled"
@@ -185,10 +186,7 @@ def _close_stdin(process: subprocess.Popen[bytes]) -> None:
 
 
 def _close_inherited_inputs() -> None:
-    """Close a forked child's copy of the pipe to the second process.
-
-    The second process then ends with its parent.
-    """
+    """Close a forked child's copy of the pipe, so that the second process ends with its own parent."""
     for process in _background.values():
         process.returncode = 0
         _close_stdin(process)
@@ -207,7 +205,7 @@ def all_kernels_on_disk() -> bool:
 
 
 def load_all_kernels() -> None:
-    """Load or compile the kernels of both groups before several processes start."""
+    """Load or compile the kernels of both groups, without `hessians`, `imus` and `one_configuration`."""
     missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_PROCESS_KERNELS))
     compiler = _start_compiler(_SECOND_PROCESS_KERNELS) if missing else None
     try:

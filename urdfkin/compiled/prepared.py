@@ -93,11 +93,9 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether `Robot.prepare` created this object.
-        #: The first call of an object from `Robot.prepare` loads or compiles machine code.
+        #: Whether the first call loads or compiles machine code; `Robot.prepare` sets True.
         self.always_load = False
-        # Each attribute first contains `_compute_first`.
-        # `_compute_first` replaces this attribute by the fast function.
+        # `_compute_first` replaces the attribute of its quantity by the fast function.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -180,10 +178,7 @@ class PreparedFrame:
         )
 
     def _compute_first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
-        """Create a fast function and compute the first result.
-
-        None means that `Robot` must compute the result.
-        """
+        """Create a fast function and compute the first result; None if `Robot` must compute the result."""
         # Only `Robot` normalises quaternions and checks for overflow.
         needs_robot = self._robot.tree.floating_joints or self._plan.may_overflow
         if needs_robot or not (isinstance(q, np.ndarray) and q.ndim == 1):

@@ -41,7 +41,6 @@ COSINE = (
 
 
 def _c_fma() -> Callable[[float, float, float], float]:
-    """Return the C library's fused multiply-add."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
     return function
@@ -50,7 +49,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
 def _fma_without_errors(
     own: Callable[..., float], c: Callable[..., float]
 ) -> Callable[[float, float, float], float]:
-    """Return a fused multiply-add that gives inf or nan instead of an error."""
+    """Return a fused multiply-add that gives inf or nan, unlike `math.fma`, which raises an error."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:

@@ -527,7 +527,7 @@ def forward_recursion(address, axes, orders, state_for_output, store_axis, write
     m = LANES if n >= LANES else 1
     total = broadcast(0.0)
     for first in range(0, n, m):
-        start = min(first, n - m)  # The last block may overlap the block before it.
+        start = min(first, n - m)  # The last two blocks may overlap.
         total = _add_input_squares(total, m, args, program, start, orders)
         _compute_block(
             axes,

@@ -1,4 +1,7 @@
-"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains a self-test."""
+"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains a self-test.
+
+A LaTeX document contains the formulas, but no self-test.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,11 @@ def code_for_language(code: FrameCode, to: str) -> FrameCode:
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """Return an exported file's text with its digest.
 
-    `file`, for example `arm.c`, replaces the default file name in the text.
+    `file`, for example `arm.c`, replaces the default file name in the text. The default name remains if
+    `file` contains other characters than ASCII letters, digits, "_", "." and "-".
+
+    Raises:
+        UnknownNameError: `to` is not a key of `LANGUAGES`.
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)

@@ -56,10 +56,7 @@ def insert_seal(text: str) -> str:
 
 
 def _has_valid_seal(text: str) -> bool | None:
-    """Return whether the digest is correct.
-
-    None without a digest.
-    """
+    """Return whether the digest is correct; None without a digest."""
     text = text.replace("\r\n", "\n")
     if (found := _SEAL_LINE.search(text)) is None:
         return None
@@ -127,7 +124,7 @@ def _has_gpu() -> bool:
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
     """Run the test vectors in double and single precision.
 
-    Of a CUDA file, the GPU functions are checked only if nvcc and a GPU are available.
+    The check of a CUDA file includes the GPU functions only if nvcc and a GPU are available.
     """
     name = _find_program_name(_MAIN_MACRO, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")

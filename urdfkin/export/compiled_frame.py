@@ -208,7 +208,7 @@ class CompiledFrame:
 
     Attributes:
         frame: The frame's name.
-        reference: The reference frame of velocities, Jacobians and accelerations.
+        reference: The reference frame of velocities, Jacobians, Hessians and accelerations.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
@@ -305,7 +305,10 @@ class CompiledFrame:
     def hessian(
         self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """Return the Hessian (..., 6, nv, nv), dJ/dq; J-dot is the product of the Hessian and v (eq. 7.126).
+        """Return the Hessian (..., 6, nv, nv).
+
+        The Hessian is the derivative of the Jacobian with respect to each joint's motion. The product of the
+        Hessian and v is the time derivative of the Jacobian (eq. 7.126).
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").compile("tip")

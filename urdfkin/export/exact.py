@@ -229,7 +229,7 @@ def make_exact_functions(
 
 
 def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Evaluate at fifty digits, then round."""
+    """Evaluate with more than `REFERENCE_DIGITS` digits, then round to doubles (n, ...)."""
     with precision(REFERENCE_DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
             list(map(float, evaluate_intervals(function, one)))

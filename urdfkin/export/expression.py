@@ -1,4 +1,4 @@
-"""Symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
+"""Symbolic numbers: arithmetic with these numbers creates a graph of expressions for exported code.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
 The graph simplifies each new expression:
@@ -40,10 +40,9 @@ class Node:
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
         operands: Nodes and constants, or an input's index.
-        index: Number in the order of creation.
-            Operands have smaller numbers.
-        step: Index of the recursion's step.
-            The joints come first, then the frame and the results.
+        index: Number in the order of creation; operands have smaller numbers.
+        step: Index of the recursion's step: first the joints, then the frame, then the results.
+            The step of exact constants is -1.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
@@ -176,17 +175,14 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return y if x is the expression -y or the negative constant -y.
-
-    Otherwise return None.
-    """
+    """Return y if x is the expression -y or the negative constant -y, else None."""
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None
 
 
 def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
-    """Sort operands of a commutative operation."""
+    """Sort operands of a commutative operation, so that x + y and y + x are the same node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 

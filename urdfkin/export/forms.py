@@ -83,7 +83,7 @@ def make_chain_code(
 
 
 def _replace_unsafe_names(table: DHTable) -> DHTable:
-    """Replace names that a URDF does not allow."""
+    """Replace every name by a safe identifier, because a URDF does not allow all names."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

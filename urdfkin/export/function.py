@@ -241,10 +241,7 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives with respect to x.
-
-        A constant increases the bounds.
-        """
+        """Add `slope` to the derivatives with respect to x; if x is a constant, add to the bounds."""
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
         elif x in slopes:
@@ -285,9 +282,6 @@ def _constant_error(x: float) -> float:
 
 
 def _add_range_error(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add errors of numbers that underflow.
-
-    Overflow gives inf.
-    """
+    """Add the error of possible underflow; overflow gives inf."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

@@ -1,6 +1,6 @@
 """Write a file for MATLAB and Octave.
 
-The main function returns handles of all other functions and of the check.
+The main function returns handles of the exported functions and of the check.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import sanitize
 
-#: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix.
+#: Maximum length of a name before a prefix and a number are added; MATLAB allows 63 characters in all.
 _MAX_LENGTH = 40
 _MAX_COMMENT_LENGTH = 80
 

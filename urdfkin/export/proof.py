@@ -185,7 +185,6 @@ def _make_vectors(
     reference: Reference,
     functions: Sequence[Function],
 ) -> tuple[tuple[ExportVector, ...], dict[str, float]]:
-    """Return test vectors and single-precision bounds."""
     tree = verifier.tree
     link = tree.frame_link(frame)
     samples = draw_samples(tree, VECTOR_COUNT, np.random.default_rng(1), with_zero_and_limits=False)
@@ -224,10 +223,7 @@ def _make_vectors(
 def _tolerances_and_scales(
     function: Function, part: CallPart, errors: DecimalErrors
 ) -> tuple[FloatArray, FloatArray]:
-    """Return error bounds and scales.
-
-    Both shapes are (n, numbers). The bounds are in eps.
-    """
+    """Return error bounds in eps and scales, both (n, numbers)."""
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
@@ -238,7 +234,7 @@ def _tolerances_and_scales(
 
 
 def format_decimal(x: Number) -> str:
-    """Return an interval as decimal text.
+    """Return an interval's midpoint as decimal text, at most `REFERENCE_DIGITS` digits.
 
     If the interval contains 0, the text is "0.0".
     """
@@ -257,8 +253,7 @@ def _round_down(x: float) -> str:
 def _round_up(x: float) -> str:
     """Round a bound up.
 
-    A smaller bound could reject a correct result.
-    For example, a rounded constant's error can be exactly the bound.
+    A smaller bound could reject a correct result, because a rounded constant's error can equal the bound.
     """
     return _round(x, 7, ROUND_CEILING)
 

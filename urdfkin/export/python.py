@@ -1,6 +1,7 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. A `Dialect` describes the code around them for one library.
+The expressions are the same for all libraries, except for `sympy-exact`, which has exact constants. A
+`Dialect` describes the code around the expressions for one library.
 """
 
 from __future__ import annotations
@@ -101,10 +102,7 @@ def _numpy_first_lines(writer: Writer) -> list[str]:
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Make code that creates zeros.
-
-    The zeros have the inputs' batch shape, type and device.
-    """
+    """Make code that creates zeros of the inputs' batch shape, type and device."""
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)

@@ -5,7 +5,7 @@ motion about or along z.
 
 | Quantity | Axes of the vectors |
 |---|---|
-| placement, Jacobian | world, as in the textbook |
+| placement, Jacobian and its derivatives | world, as in the textbook |
 | velocity, acceleration for WORLD | world |
 | other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
 

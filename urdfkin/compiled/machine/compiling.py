@@ -40,8 +40,8 @@ _dumps: Any = dumps
 class KernelCache(_NullCache):  # type: ignore[misc]
     """The disk cache of one function.
 
-    The key contains the text of the function's source file. Of all sources, the folder's name depends only
-    on those of `compiled` and `kinematics`.
+    The key contains the text of the function's source file, because `urdfkin.verify` also has kernels. The
+    folder's name depends only on the sources of `compiled` and `kinematics`.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, report_start: Callable[[], None]) -> None:

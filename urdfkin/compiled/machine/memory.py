@@ -109,7 +109,7 @@ def _make_pointer_function(kind: Any) -> Any:
 doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
-#: Maximum number of doubles that are prefetched.
+#: `prefetch` does nothing for more doubles.
 #: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_PREFETCHED = 3072
 
@@ -120,10 +120,7 @@ def _slice_vector(builder: Any, vector: Any, start: int, width: int) -> Any:
 
 
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Concatenate vectors of equal length.
-
-    The count must be a power of two.
-    """
+    """Concatenate vectors of equal length; the number of vectors must be a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -360,9 +357,10 @@ def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @inline
 def stream(x, count, to, at, address):
-    """Copy numbers. Whole cache lines bypass the caches.
+    """Copy numbers; whole cache lines bypass the caches.
 
-    A write of a whole cache line needs no read. `address` is the address of `to[0]`.
+    A write of a whole cache line needs no read. `count` must be at least 7, because up to 7 numbers precede
+    the first whole line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

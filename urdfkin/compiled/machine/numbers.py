@@ -86,8 +86,6 @@ class _ConstantNumberModel(models.OpaqueModel):
 
 
 class _Value:
-    """A typed value in LLVM code."""
-
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_
         self.value = value
@@ -232,7 +230,7 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
 
 
 def _lower_sum(*, negative: bool) -> Callable[..., Any]:
-    """Generate code for sums or differences."""
+    """Return the function that generates code for x + y, or for x - y if `negative`."""
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def apply_sign(value: Any) -> Any:

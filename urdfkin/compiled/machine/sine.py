@@ -116,7 +116,7 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _any_large(context: Any, x: Any) -> Any:
-    """Detect nan and large angles."""
+    """Return whether any angle is nan or at least `LARGEST_ANGLE`."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments

@@ -91,11 +91,7 @@ def _call(context: Any, address: Any, argument: Any) -> Any:
 
 @intrinsic
 def _test_and_set(context: Any, numbers: Any, index: Any) -> Any:
-    """Atomically replace `numbers[index]` by 1.
-
-    Returns:
-        The previous value.
-    """
+    """Atomically replace `numbers[index]` by 1, and return the previous value."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         one = ir.Constant(ir.IntType(64), 1)
@@ -167,11 +163,7 @@ def one_configuration(bound, arguments, count):
 
 @inline
 def _compute_into(address, inputs, to, ndarray):
-    """Write the result to `to`.
-
-    Returns:
-        Whether the result is valid.
-    """
+    """Write the result to `to`, and return whether the result is valid."""
     args = integers_at(address)
     orders, rows, columns, width = args[_ORDERS], args[_ROWS], args[_COLUMNS], args[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, args[_AXES], rows, columns)
@@ -210,10 +202,7 @@ _BUILTIN_CONSTRUCTOR = ctypes.PYFUNCTYPE(
 
 
 def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Make a function from machine code.
-
-    The function keeps `bound` alive.
-    """
+    """Make a function from machine code; the function keeps `bound` alive."""
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _BUILTIN_CONSTRUCTOR(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
