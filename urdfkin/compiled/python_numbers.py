@@ -20,7 +20,7 @@ NO_OVERFLOW_BOUND = 1e45
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _TWO_OVER_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
 #: Adding this constant rounds a number between -2^51 and 2^51 to an integer.
-#: The lowest bits of the sum's mantissa are this integer.
+#: The sum's mantissa contains the integer in its lowest bits.
 ROUNDING_SHIFT = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,

@@ -207,13 +207,14 @@ class JointMatcher:
         """Return the difference of two joint axes.
 
         Returns:
-            Angle (rad) and distance (m):
+            Angle (rad) and distance (m).
 
-                revolute joints:             between the axes
-                prismatic joints:            angle between the axes, 0
-                planar joints:               angle between the normals, 0
-                floating joints:             0, 0
-                different kinds of joints:   0, 0
+            | Joints | Angle | Distance |
+            |---|---|---|
+            | revolute | between the axes | between the axes |
+            | prismatic | between the axes | 0 |
+            | planar | between the normals | 0 |
+            | floating, or of different kinds | 0 | 0 |
         """
         kind = motion_type(self.a.joint(e).kind)
         if kind != motion_type(self.b.joint(f).kind):

@@ -157,7 +157,10 @@ class MechanismMatcher:
         return best
 
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield pairs of first bodies, each with a pose (4, 4) of B's root in A's root frame."""
+        """Yield a body of A, a body of B and a pose (4, 4) of B's root in A's root frame, for each search.
+
+        The search for matching joints starts at the two bodies.
+        """
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
