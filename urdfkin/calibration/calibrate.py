@@ -251,13 +251,15 @@ def calibrate(
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
         q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
             could be identified.
-        poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m.
+        poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m. If `fit` contains
+            "base", the poses are in the instrument's frame. If `fit` contains "tool", they are poses of the
+            target.
         tip: Name of a link or joint; the robot's tip when None.
         base: Name of a link or joint; the robot's base frame when None.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
-            six numbers of each joint origin, or all cells of a table. "gains": the scale factors of the joint
-            values.
+            six numbers of each joint origin, or the cells of a table. A table's row has the cell beta only if
+            the next axis is nearly parallel or beta is not 0. "gains": the scale factors of the joint values.
         noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
@@ -275,6 +277,7 @@ def calibrate(
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
         VerificationError: for the written model, the results of urdfkin and Pinocchio differ.
+        UrdfkinError: the tip's poses of the written URDF differ from the fit.
 
     Example:
         >>> import urdfkin
@@ -378,11 +381,7 @@ def _path_joint_values(model: CalibrationModel, robot: Robot, q: FloatArray) -> 
 def _check_measured(
     robot: Robot, model: CalibrationModel, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measurements]:
-    """Check the measured data.
-
-    Returns:
-        (samples, n) values of the path's independent joints, and the measured poses.
-    """
+    """Return (samples, n) values of the path's independent joints, and the measured poses."""
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.parse(q, "q")
@@ -728,7 +727,6 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 
 
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
-    """Remove rounding errors from rotation matrices."""
     R = T[:, :3, :3]
     wrong = rotation_defect(R) > _ROTATION_TOLERANCE
     if wrong.any():

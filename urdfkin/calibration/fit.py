@@ -16,8 +16,8 @@ and Mooring, 1987):
 | tip | none | 6 of 6 |
 | tip, only positions measured | orientation of the tool | 3 of 6 |
 
-Orthogonal elimination chooses the fitted parameters, joint by joint, from base to tip. Each parameter has a
-column in the Jacobian.
+Orthogonal elimination chooses the fitted parameters of the base, then of the tool, then of each joint from
+base to tip. Each parameter has a column in the Jacobian.
 
     remainder of a column: the column minus its projection onto the chosen columns
     length of the remainder: independence from the chosen columns
@@ -47,7 +47,7 @@ A pose is an **outlier** if its statistic is too large:
     statistic                 r_i^T (1 - H_ii)^-1 r_i
     without outliers          chi^2 distribution
     degrees of freedom        3 for a position, 6 for a full pose
-    limit                     without outliers, any statistic exceeds it with a probability of about 1 %
+    limit                     without outliers, some statistic exceeds it with a probability of about 1 %
 
 One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
 The steps end when no outlier is left, or at the maximum number of outliers.
@@ -234,10 +234,12 @@ _MAX_OUTLIER_FRACTION = 0.25
 class Measurements:
     """Measured poses or positions.
 
+    The measurements are in the instrument's frame if the model has `base` parameters, else in the base frame.
+
     Attributes:
         joint_values: (s, n) joint values of the path, rad or m.
-        p: (s, 3) positions in the base, m.
-        R: (s, 3, 3) orientations in the base; None if only positions were measured.
+        p: (s, 3) positions, m.
+        R: (s, 3, 3) orientations; None if only positions were measured.
     """
 
     joint_values: FloatArray
@@ -278,7 +280,7 @@ class Fit:
 
     Attributes:
         parameter_values: (p,) values of all parameters.
-        residuals: (s, 6) or (s, 3) measured minus computed values, in the base, m and rad.
+        residuals: (s, 6) or (s, 3) measured minus computed values, in the measurements' frame, m and rad.
         noise: The standard deviations by which the residuals are divided.
         covariance: (k, k) covariance of the fitted parameters, in their units. Infinite if the redundancy is
             0 and the noise is not stated.
@@ -304,7 +306,10 @@ class Fit:
 
     @property
     def noise_ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct."""
+        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct.
+
+        The ratio is nan if `has_redundancy` is false.
+        """
         if not self.has_redundancy:
             return math.nan
         whitened = self.residuals / self.noise.deviations(self.residuals.shape[1] == 6)
@@ -329,7 +334,7 @@ class Fit:
 def compute_residuals(
     model: CalibrationModel, measurements: Measurements, parameter_values: FloatArray
 ) -> FloatArray:
-    """Return residuals along the base's axes.
+    """Return residuals along the axes of the measurements' frame.
 
     Returns:
         (s, 3) for positions, or (s, 6) for poses, m and rad.
@@ -380,10 +385,7 @@ def fit_parameters(
 
 
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
-    """Estimate the noise from the residuals.
-
-    The estimate is at least the rounding error, because an estimate of 0 would cause a division by 0.
-    """
+    """The estimate is at least the rounding error, because an estimate of 0 would cause a division by 0."""
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
     def estimate_deviation(part: slice, minimum: float, default: float) -> float:
@@ -611,7 +613,7 @@ def _solve_base_tool_translations(
 
 
 def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
-    """Check that positions are in metres."""
+    """Raise InputError if the measured positions seem to be in millimetres."""
     T = model.chain.poses(measurements.joint_values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)

@@ -26,7 +26,8 @@ the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL_TOLERANCE`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
-parameters of other rows. A tilt of the axis in any direction needs both alpha and beta.
+parameters of other rows. A tilt of the axis in any direction needs both alpha and beta. A row with a nonzero
+beta always has the parameter beta.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ class ParametricChain:
         """Return the tip's poses.
 
         Returns:
-            (s, 4, 4) poses in the base.
+            (s, 4, 4) poses in the base frame; in the instrument's frame if the model has `base` parameters.
         """
         return self.path.poses(
             self._amounts_and_derivatives(
@@ -163,11 +164,7 @@ class ParametricChain:
     def _amounts_and_derivatives(
         self, joint_values: FloatArray, parameter_values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the angle or length of each motion.
-
-        Returns:
-            (s, motions) angles or lengths, and their derivatives by the parameters.
-        """
+        """Return (s, motions) angles or lengths, and their derivatives by the parameters."""
         factors = np.empty((len(joint_values), len(self._parametric_motions)))
         numbers = np.ones(len(self._parametric_motions))
         for k, motion in enumerate(self._parametric_motions):

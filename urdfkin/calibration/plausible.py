@@ -193,11 +193,7 @@ class FitWithData:
         ]
 
     def _joint_parameter_changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield changes of moving joints' parameters.
-
-        Yields:
-            Parameter, change, lower bound of |change|.
-        """
+        """Yield parameter, change and lower bound of |change|, for moving joints."""
         model, fitted = self.model, self.full_fit
         near = set[str]()
         if not self.measurements.full_poses:
@@ -265,11 +261,7 @@ def _find_implausible_values(model: CalibrationModel, q: FloatArray) -> tuple[li
 
 
 def _coordinates_with_limits(model: CalibrationModel) -> Iterator[tuple[str, bool, float, float]]:
-    """Yield the path's coordinates.
-
-    Yields:
-        (name, is_angle, lower limit, upper limit).
-    """
+    """Yield (name, is_angle, lower limit, upper limit)."""
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
         lower, upper, kind = -math.inf, math.inf, kinds.get(name)
@@ -408,8 +400,5 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm of residuals, m.
-
-    Angles are multiplied by the reach.
-    """
+    """Return the norm, m; angles are multiplied by the reach."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))

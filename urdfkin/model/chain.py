@@ -75,7 +75,7 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame; in the base frame if `joints` is empty.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
             upper bound on the translation in A_k. Other rotations of the fixed joints give the same bound.
-        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k.
+        pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

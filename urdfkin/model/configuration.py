@@ -373,7 +373,6 @@ def parse_locks(
 
 
 def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
-    """Check the limits of locked joints."""
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in locked.items():
         q[tree.q_index[tree.joint_index(name)]] = value

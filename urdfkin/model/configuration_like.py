@@ -9,7 +9,7 @@
 | a mapping from names to numbers, text or batches | `{"shoulder": "30deg", "elbow": [0.1, 0.2]}` |
 | a pandas Series or DataFrame, or another table with named columns | read as a mapping |
 
-A missing name is an error; it never means 0.
+Without a named pose, a missing name is an error; a missing value is never 0.
 """
 
 from __future__ import annotations
@@ -238,10 +238,7 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
 
 
 def _labels(value: object) -> list[Any]:
-    """Return the labels of a table.
-
-    The labels 0, 1, 2, ... count as no labels.
-    """
+    """The labels 0, 1, 2, ... count as no labels."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []

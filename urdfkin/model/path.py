@@ -67,10 +67,7 @@ class Path:
         return frames
 
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
-        """Yield the pose after each step.
-
-        The yielded arrays may share memory.
-        """
+        """The yielded poses may share memory."""
         # A motion by 0 changes nothing and is skipped.
         moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))

@@ -470,7 +470,10 @@ def with_pinocchio_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> Kin
 
 
 def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Add named poses."""
+    """Replace the tree's named poses.
+
+    Only values of independent joints with one coordinate are kept.
+    """
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()

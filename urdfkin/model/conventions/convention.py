@@ -91,7 +91,12 @@ class JointRule:
 class Convention:
     """The layout of q, v, a and six-vectors in another program.
 
-    The defaults are urdfkin's convention. `conventions.toml` explains each attribute.
+    The defaults are urdfkin's convention. The first lines of `conventions.toml` explain `order`, `evidence`,
+    `measurement`, and all attributes from `continuous` to `angle`.
+
+    Attributes:
+        joints: Names of the joints in order, if `order` is "given".
+        rules: Rules of single joints, by the joint's name in the URDF.
     """
 
     name: str
@@ -259,10 +264,7 @@ def as_toml(convention: Convention) -> str:
 
 
 def _quote(text: str) -> str:
-    """Quote a text for TOML.
-
-    TOML also requires an escape for DEL.
-    """
+    """Quote as JSON does; TOML also requires an escape for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -55,7 +55,7 @@ class _FreeJoint:
         q_index: First index in urdfkin's q.
         v_index: First index in urdfkin's v.
         target_slice: Indices in the target program's v.
-        velocity_point: (3,) the link's origin or centre of mass, in the joint's frame (m).
+        velocity_point: (3,) the link's origin or centre of mass, in the link's frame (m).
     """
 
     joint: Joint
@@ -172,8 +172,8 @@ class Conversion:
         for i, joint in enumerate(tree.joints):
             children.setdefault(joint.parent, []).append(i)
         if order.startswith("breadth first"):
-            joint_roundings = [joint.name for joint in tree.joints]
-            keys = joint_roundings if order.endswith(("by name", "fixed joints")) else ranks
+            joint_names = [joint.name for joint in tree.joints]
+            keys = joint_names if order.endswith(("by name", "fixed joints")) else ranks
             return self._breadth_first(children, keys, merge_fixed=not order.endswith("fixed joints"))
         ordered_joints, stack = [], sorted(children.get(0, []), key=ranks.__getitem__, reverse=True)
         while stack:
@@ -287,11 +287,7 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Read a link's centre of mass.
-
-        Returns:
-            (3,) in the link's frame, m.
-        """
+        """Return (3,) in the link's frame, m."""
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
