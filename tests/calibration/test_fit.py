@@ -84,7 +84,7 @@ def test_gains_are_identified_and_not_written() -> None:
     found = true.calibrate(fit=["gains"])
     np.testing.assert_allclose(found.changes, true.truth, atol=1e-14)
     assert found.updated_urdf.text == true.robot.urdf.encode()
-    words = "these gains are not written, because a URDF cannot store them: "
+    words = "these gains are not written, because neither a URDF nor a table can store them: "
     assert any(line.startswith(words) for line in list_warnings(found))
 
 
@@ -148,6 +148,13 @@ def test_outliers_are_reported_and_excluded_only_on_request() -> None:
     assert [len(fit.residuals) for fit in fits] == [60, 58]
     assert fits[1].noise.metres < 1.2e-4 < fits[0].noise.metres
     assert list_warnings(clean) == ["poses 17, 40 are excluded as outliers"]
+
+
+def test_a_path_without_parameters_is_refused() -> None:
+    robot = load("ur5")
+    base = robot.base_frame
+    with pytest.raises(InputError, match="base_link to base_link: the path has no parameters to fit"):
+        calibrate(robot, fit=["offsets"], tip=base, base=base)
 
 
 def test_a_fit_without_redundant_measurements_is_refused() -> None:

@@ -615,7 +615,7 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
     ]
     if gains:
         yield (
-            "these gains are not written, because a URDF cannot store them: "
+            "these gains are not written, because neither a URDF nor a table can store them: "
             + join_names((name[k] for k in gains), _MAX_NAMES)
         )
 

@@ -345,6 +345,13 @@ class _ModelBuilder:
         ends: tuple[str, str],
         preferences: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
+        if not self.parameters:
+            raise InputError(
+                "the path has no parameters to fit",
+                where=f"{ends[0]} to {ends[1]}",
+                found=f"fit={', '.join(sorted(self.fit))}",
+                remedy="choose a path with a joint, or also fit base or tool",
+            )
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
         # If parameters of base or tool and of a joint have the same effect, base or tool is fitted.
         # The values of base and tool are unknown before the fit.
