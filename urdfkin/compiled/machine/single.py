@@ -112,10 +112,9 @@ def _clear_flag(context: Any, numbers: Any, index: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles.
+    """Return the address of the doubles; 0 for unsupported arrays.
 
-    The address is 0 for unsupported arrays. The array must have `axes` axes and the shape (rows, columns,
-    columns, ...).
+    The array must have `axes` axes and the shape (rows, columns, columns, ...).
     """
     x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
@@ -243,8 +242,8 @@ def make_single_evaluator(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Make a function for one configuration.
 
-    The tree must have one frame and a fixed base. The returned array contains the kernel's arguments.
-    The function counts its valid results in `KernelArgs.COUNT`.
+    `plan` must have one frame. The base is fixed at the world's origin. The returned array contains the
+    kernel's arguments. The function counts its valid results in `KernelArgs.COUNT`.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
