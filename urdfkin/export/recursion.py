@@ -175,11 +175,11 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 
 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the Hessian row by row.
+    """Return the Hessian (6, nv, nv) row by row.
 
-    The Hessian contains a matrix H_i (6, nv) for each coordinate i:
+    The Hessian contains a matrix H_i (6, nv) for each joint motion i:
 
-        H_i: derivative of the Jacobian with respect to coordinate i
+        H_i: derivative of the Jacobian with respect to joint motion i
         time derivative of the Jacobian = sum of H_i v_i (7.126)
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
