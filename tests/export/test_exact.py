@@ -195,7 +195,7 @@ _OPERATIONS: dict[str, Callable[..., Counted]] = {
 
 def of_constant(R: Matrix, S: FloatArray) -> Matrix:
     """Return R S by the exported expressions; each omitted entry of S has the largest possible size."""
-    graph, kept = Graph(), [recursion._without_rounding(row) for row in S.tolist()]
+    graph, kept = Graph(), [recursion._drop_tiny_entries(row) for row in S.tolist()]
     letters = [[graph.make_input("q", 3 * r + c) for c in range(3)] for r in range(3)]
     results = graph.chapter.product(letters, kept)
     value: dict[Node, Counted] = {}
@@ -299,7 +299,7 @@ def test_at_most_half_an_eps_of_the_largest_number_is_omitted_from_a_constant() 
     for largest in (1.0, 0.3, 7e5, 5e-324):
         for share in (0.0, 0.49, 0.51, 1e3):
             row = largest, -share * EPS * largest, 0.0
-            kept = recursion._without_rounding(row)
+            kept = recursion._drop_tiny_entries(row)
             assert kept[0] == largest
             assert abs(kept[1] - row[1]) <= 0.5 * EPS * largest
             assert kept[1] == row[1] or share < 0.5

@@ -1,6 +1,6 @@
 """Compute lower and upper bounds on the largest distance between a frame's positions in two models.
 
-**Search.** The search starts at the random configurations with the largest distances, and varies one
+**Search.** The search starts at the sampled configurations with the largest distances, and varies one
 coordinate at a time. The largest distance found is a lower bound of the true largest distance.
 
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
@@ -166,7 +166,7 @@ class DistanceSearch:
         """Return poses in A's root frame.
 
         Returns:
-            Poses of A's frames, and of B's frames, each (n, frames, 4, 4).
+            Poses of A's frames, and of B's frames without their tools, each (n, frames, 4, 4).
         """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -227,12 +227,7 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize distances by coordinate search.
-
-        Args:
-            frames: Matching frames.
-            z: (frames, starting points, variables) values at which the search starts.
-        """
+        """Maximize distances by coordinate search from z (frames, starting points, variables)."""
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
@@ -259,14 +254,9 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances of frame k at the values `z[k]`.
+        """Return the distances (frames, starting points, trials), m, of each frame k at the values `z[k]`.
 
-        Args:
-            z: (frames, starting points, trials, variables) values of the variables, one row per trial.
-            frames: Matching frames.
-
-        Returns:
-            (frames, starting points, trials) distances, m.
+        z has the shape (frames, starting points, trials, variables).
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -311,7 +301,7 @@ BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Compute an upper bound on a frame's distance for each box.
+    """Compute the first-order part of the upper bound on a frame's distance, for each box.
 
     Args:
         names: Every variable that changes the distance.
@@ -376,12 +366,9 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return a point's position and Jacobian.
+        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
 
         `point` (3,) contains the point's coordinates in `frame`, m.
-
-        Returns:
-            (n, 3) position, and (n, 3, nv) Jacobian.
         """
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]

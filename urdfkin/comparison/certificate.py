@@ -273,7 +273,7 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
     The check matches the joints as in the certificate. For the verdict "differs", `recheck` also matches the
-    joints as `same` does: the verdict must be the same.
+    joints as `same` does without a map: the verdict must be the same.
 
     Returns:
         A line for each wrong statement.
@@ -433,7 +433,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Compare two entries up to rounding."""
+    """Compare two entries up to rounding; `zero` is the tolerance of numbers near zero."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -485,8 +485,7 @@ def _interval_errors(
 ) -> Iterator[str]:
     """Yield an error for each wrong or unproven bound.
 
-    `rounding` contains a distance (m) and an angle (rad). If `use_branch_and_bound` is true, the check may
-    use branch and bound.
+    `rounding` contains a distance (m) and an angle (rad).
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:

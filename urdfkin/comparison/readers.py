@@ -92,8 +92,8 @@ def compare_readers(
 ) -> tuple[LibraryReading, ...]:
     """Compare how urdfkin and other libraries read a robot's file.
 
-    By default, all installed libraries for the file's format are used. All link poses are compared at q = 0
-    and at random configurations.
+    By default, all installed libraries for the file's format are used. The poses of all common links are
+    compared at the neutral configuration and at random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
@@ -187,11 +187,7 @@ def _compare_reader(
 
 
 def _library_input(robot: Robot) -> tuple[str, str]:
-    """Return the input for other libraries.
-
-    Returns:
-        The URDF text, or the path of the MJCF or USD file; and the format, for example "urdf".
-    """
+    """Return the URDF text, or the path of the MJCF or USD file; and the format, for example "urdf"."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -255,13 +251,10 @@ def _find_cause(
     shared_joints: Sequence[str],
     tolerance: float,
 ) -> tuple[str, str]:
-    """Return the cause of a difference.
+    """Return the cause of a difference, for example "origin rpy" or "axis", and a description.
 
     `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
-    pose is at q = 0.
-
-    Returns:
-        The cause, for example "origin rpy" or "axis", and a description.
+    pose is at the neutral configuration.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

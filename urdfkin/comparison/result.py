@@ -88,9 +88,9 @@ class Interval:
         frame_b: The link of B.
         lower: Lower bound of the largest distance, m: the distance at `q_a` and `q_b`, minus rounding errors.
         upper: Proven upper bound of the distance, m; inf without a bound.
-        radians: Proven upper bound of the angle between the frames.
+        radians: Proven upper bound of the angle between the frames, rad; inf without a bound.
         radians_seen: Angle between A's frame at `q_a` and B's frame at `q_b`, rad.
-        q_a: Configuration of A.
+        q_a: Configuration of A; empty if the frame does not differ.
         q_b: The corresponding configuration of B.
     """
 
@@ -337,9 +337,10 @@ class Sameness(Displayable):
             None if no file has single precision.
         unexplained: Differences between the unchanged models that rounding does not explain, by joint or
             link. The numbers of a USD file are rounded to single precision.
-        frames: One interval for each pair of matching links, after the changes in `after`.
+        frames: One interval for each pair of matching links, after the changes in `after`. Empty if the
+            bounds were not computed.
         as_written: Interval of the frame with the largest distance found, without the changes in `after`.
-            None if `after` is empty.
+            None if `after` is empty, the bounds were not computed, or no frames can be compared.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. Of a Denavit-Hartenberg table, only frames
             with equal names in A and B are compared.
@@ -510,7 +511,7 @@ class Sameness(Displayable):
         Coordinates that only B has are neutral.
 
         Raises:
-            InputError: q does not have A's length.
+            InputError: q does not have A's length, or a coordinate is not finite.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -738,11 +739,10 @@ def _support_link_pairs(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _support_and_side_links(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Find links that support the robot, and links beside the robot.
+    """Return the links of the root body that support the robot, and those beside the robot.
 
-    Returns:
-        Links of the root body with a fixed child that carries all moving joints, for example a pedestal.
-        Links of the root body that carry no moving joint, for example a table next to the robot.
+    A supporting link has a fixed child that carries all moving joints, for example a pedestal. A link beside
+    the robot carries no moving joint, for example a table.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -862,11 +862,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _tilt_and_shift(pair: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return tilt and shift beyond rounding.
-
-    Returns:
-        Tilt (rad) and shift (m), each 0 if it is at most the tolerance in `rounding`.
-    """
+    """Return tilt (rad) and shift (m), each 0 if it is at most the tolerance in `rounding`."""
     return (
         pair.tilt if pair.tilt > rounding.angle else 0.0,
         pair.shift if pair.shift > rounding.distance else 0.0,

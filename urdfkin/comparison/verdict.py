@@ -64,7 +64,7 @@ CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
 #: The search for the largest distance between the unchanged models uses at most this number of frames.
 MAX_REFINED_FRAMES = 4
-#: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
+#: Maximum length (m) of a path from the root to a link; the square of a longer length could overflow.
 MAX_PATH_METRES = 1e150
 #: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
 SHARP_FACTOR = 1.05
@@ -278,11 +278,7 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound how far single precision can displace frames.
-
-        Returns:
-            Distance, m, and angle, rad; None if no model has single precision.
-        """
+        """Bound the displacement of frames by rounding (m, rad); None if no model has single precision."""
         if all(robot.single is None for robot in self.robots):
             return None
         pairs = [(frame.a, frame.b) for frame in alignment.frames]
@@ -397,11 +393,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Bound displacements between unchanged models.
-
-        Returns:
-            Distance, m, and angle, rad.
-        """
+        """Bound the displacements (m, rad) between unchanged models."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -469,10 +461,7 @@ class Comparator:
         attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
-        """Return the interval of a frame.
-
-        `attained` contains the largest distance found (m), and the values of the variables there.
-        """
+        """`attained`: the largest distance found (m), and the values of the variables there."""
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
@@ -528,10 +517,7 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each translating joint and the travel of the joint, m.
-
-    The travel of a joint without limits is infinite.
-    """
+    """Yield each translating joint and the travel of the joint (m), which is infinite without limits."""
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
             yield step, math.inf
@@ -610,7 +596,7 @@ def _match_usd_spellings(
 
 
 def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
-    """Map USD spellings to original names."""
+    """Map each USD spelling of exactly one original name to this name."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -772,11 +758,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints from the last common ancestor of `start` and `end` to each of the two links.
-
-        Returns:
-            Joints to `start`, and to `end`.
-        """
+        """Return the joints from the last common ancestor to `start`, and the joints to `end`."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -831,13 +813,9 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
-        """Return the angle and the distance between two axes.
+        """Return the angle (rad) and the distance (m) between two axes.
 
-        The distance is that of one joint's origin from the other joint's axis. For a prismatic joint, the
-        distance is 0.
-
-        Returns:
-            Angle, rad, and distance, m.
+        The distance is that of one joint's origin from the other joint's axis; 0 for a prismatic joint.
         """
         ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
@@ -853,7 +831,7 @@ class JointComparison:
             path: Joints from C to the link.
 
         Returns:
-            Both, with error bounds (m, rad).
+            For each joint of `path`, the screw and error bounds (m, rad); the pose; the pose's error bounds.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)
@@ -890,7 +868,6 @@ class JointComparison:
             yield JointDifference(place, what, None, sizes, " and ".join(explained))
 
     def _free_joint_differences(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Compare a planar or floating joint."""
         ends = list(zip(self.mechanisms, paths, strict=True))
         parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
         bodies = [m.body_of[parent] for m, parent in zip(self.mechanisms, parents, strict=True)]

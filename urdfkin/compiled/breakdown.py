@@ -102,22 +102,19 @@ class AccelerationBreakdown(Displayable):
 
     @cached_property
     def by_joint(self) -> FloatArray:
-        """The contribution of each joint (..., joints, 6)."""
+        """The sum of each joint's contributions (..., joints, 6)."""
         total: FloatArray = self.terms.sum(axis=-2)
         return total
 
     @cached_property
     def by_kind(self) -> FloatArray:
-        """The joints' contributions of each kind (..., 4, 6)."""
+        """The sum of all joints' contributions of each kind (..., 4, 6)."""
         total: FloatArray = self.terms.sum(axis=-3)
         return total
 
 
 class _RelativeMotion(NamedTuple):
-    """Velocity or acceleration of a joint relative to its parent link.
-
-    `linear` and `angular` are (n, 3) arrays in world axes.
-    """
+    """Velocity or acceleration of a joint relative to its parent link; (n, 3) arrays in world axes."""
 
     linear: FloatArray
     angular: FloatArray
@@ -180,7 +177,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Write the joints' contributions to `terms`; return the base's contribution."""
+    """Write the joints' contributions to `terms`, and return the base's contribution (n, 6)."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -218,7 +215,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return the translation of a prismatic, planar or floating joint, in the joint's axes."""
+    """Return the joint's translation (n, 3) in the joint's axes; 0 for a revolute joint."""
     translation = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
@@ -238,7 +235,7 @@ def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
 def _joint_terms(
     rate: _RelativeMotion, rate_2: _RelativeMotion, w_before: FloatArray, d: FloatArray
 ) -> FloatArray:
-    """Return the terms in the order of `ACCELERATION_KINDS`."""
+    """Return the terms (n, 4, 6) in the order of `ACCELERATION_KINDS`."""
     nothing = np.zeros_like(d)
     u = eq.point_velocity(rate.linear, rate.angular, d)
     kinds = (

@@ -1,9 +1,8 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs have the shapes (n, nq) and (n, nv). `urdfkin.robot` checks the shapes; the functions of this module do
-not. Small batches are computed with Python numbers, and large batches by a compiled kernel. The module
-`preload` decides when a kernel is used. Results are exactly the same doubles for each method and for any
-number of threads.
+Inputs have the shapes (n, nq) and (n, nv). The functions of this module do not check the shapes. Small
+batches are computed with Python numbers, and large batches by a compiled kernel. The module `preload` decides
+when a kernel is used. Results are exactly the same doubles for each method and for any number of threads.
 
 | function | result | shape | equations |
 |---|---|---|---|
@@ -181,13 +180,7 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch with Python numbers.
-
-    Returns:
-        None: a kernel is available now, and must compute the batch.
-        1: an input is nan, inf or too large.
-        0: otherwise.
-    """
+    """Return None if a kernel must compute the batch; else 1 for nan, inf or too large inputs, or 0."""
     if preload.get_kernel(name) is not None:
         return None
     if threads is not None:
@@ -297,7 +290,7 @@ _MIN_THREADED_ROWS = 4096
 ROWS_PER_PART = 2048
 
 #: A function that computes rows of `out` from rows of `inputs`.
-#: It returns 1 for nan, inf or too large inputs, else 0.
+#: The function returns 1 for nan, inf or too large inputs, else 0.
 BlockFunction = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -318,6 +311,9 @@ def compute_in_threads(
 
     All arrays must be C-contiguous. An input has n rows, or one row for all configurations.
     `compute` must release Python's global interpreter lock, so that threads run in parallel.
+
+    Returns:
+        The largest value that `compute` returns; 0 without configurations.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)

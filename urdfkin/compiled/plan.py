@@ -469,10 +469,8 @@ class _ProgramWriter:
     def _joints_and_frames(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield joints and frames in the recursion's order.
 
-        Yields:
-            joint: (previous moving joint, joint, None)
-            frame: (last moving joint, None, frame)
-            -1 instead of a moving joint: the base
+        A joint is (previous moving joint, joint, None); a frame is (last moving joint, None, frame). The base
+        has the number -1 instead of a moving joint.
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -502,7 +500,7 @@ class _ProgramWriter:
         return len(self.constants) - len(numbers)
 
     def _add_transform(self, R: FloatArray, p: FloatArray, *, orientations: bool = True) -> bool:
-        """Return whether any instruction was added."""
+        """Add the needed instructions, and return whether there are any."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -542,7 +540,7 @@ class _ProgramWriter:
         )
 
     def _add_frame(self, f: int) -> bool:
-        """Add a frame's instructions; return whether they change the state in the registers."""
+        """Add a frame's instructions, and return whether the state in the registers changes."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._add_transform(offsets[:9].reshape(3, 3), offsets[9:], orientations=self.orientations)
         sources = 0

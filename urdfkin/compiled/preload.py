@@ -97,7 +97,7 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 
 
 def should_load_single_evaluator(name: str) -> bool:
-    """Return whether to load the kernel `one_configuration`.
+    """Return whether to use the kernel `one_configuration`, after loading the kernel if necessary.
 
     The answer is False until a batch kernel of the quantity `name` is loaded. Each later call adds the time
     that `one_configuration` could have saved.

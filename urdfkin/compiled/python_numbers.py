@@ -176,7 +176,7 @@ class ConstantNumber:
         return other if self.value == 0 else Number(float(other)) - self
 
     def __neg__(self) -> ConstantNumber:
-        return self
+        return self  # No equation negates 1.
 
 
 def _double(x: Any) -> float:

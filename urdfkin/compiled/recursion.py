@@ -16,12 +16,13 @@ world axes. The joint axis and the interorigin vector have constant components i
 | `select_world_axes` | rotated by R | unchanged |
 | `select_link_axes` | constant; the joint axis is (0, 0, 1) | rotated to the next link's axes |
 
-The recursion uses the axes in which the result is requested. If the result were rotated to these axes at the
-end, this rotation would add rounding errors.
+For velocities and accelerations, the recursion uses the axes in which the result is requested. If the result
+were rotated to these axes at the end, this rotation would add rounding errors. For Jacobians, the recursion
+uses world axes.
 
 The placeholder `unused()` replaces each vector that a result does not need. Kernels contain no code for
 operations with the placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions with
-Numba's number types.
+the number types of `urdfkin.compiled.machine.numbers`.
 """
 
 from __future__ import annotations
@@ -149,10 +150,7 @@ def rotate_frame(axes, state, S):
 
 
 def _rotate_about_z(axes, state, scratch, row):
-    """Rotate the frame about z (7.5).
-
-    Scratch row `row` contains the sine, row `row + 1` the cosine.
-    """
+    """Rotate about z (7.5); scratch row `row` contains the sine, row `row + 1` the cosine."""
     return rotate_frame(
         axes, state, eq.about_z(load_number(scratch, row), load_number(scratch, row + 1), zero(), one())
     )
@@ -196,10 +194,7 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
 
 
 def _joint_coordinate(scratch, row, constants, rule, is_mimic):
-    """Return a joint's coordinate.
-
-    The product and the sum of a mimic rule are rounded separately, as in Pinocchio.
-    """
+    """Round the product and the sum of a mimic rule separately, as Pinocchio does."""
     x = load_number(scratch, row)
     if is_mimic:
         x = round_product(load_constant(constants, rule) * x) + load_constant(constants, rule + 1)
@@ -405,7 +400,7 @@ def _execute_transform(axes, op, state, constants, index):
 
 
 def _execute_joint(axes, op, state, scratch, x, v, a, z, constants, rule):
-    """Execute a joint's instruction.
+    """Return the state after a joint.
 
     | operand | content |
     |---|---|

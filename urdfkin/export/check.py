@@ -72,7 +72,9 @@ class FileCheck:
     """Result of a check.
 
     Attributes:
-        warnings: Why the file is not verified.
+        lines: One line for each function and precision; a line begins with "good" or "WRONG".
+        passed: Whether each line begins with "good".
+        warnings: Reasons why the file is not verified.
     """
 
     lines: tuple[str, ...]
@@ -85,7 +87,11 @@ class FileCheck:
 
 
 def check(file: Path) -> FileCheck:
-    """Run an exported file's test vectors."""
+    """Run an exported file's test vectors.
+
+    Raises:
+        InputError: urdfkin did not write the file, cannot run a file of this kind, or the file does not run.
+    """
     text = read_text(file)
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))

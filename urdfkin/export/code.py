@@ -30,7 +30,7 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame.
 
-    No name can end a comment.
+    The names of the robot, the frame, the coordinates and the joints are escaped: no name can end a comment.
 
     Attributes:
         identifiers: Names in the code, by letter: "q": coordinates; "v", "a": velocities; "s": joints.
@@ -235,7 +235,7 @@ class Writer:
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, precedence: int = _SUM) -> str:
-        """Return an expression, bracketed if necessary."""
+        """Return an expression as code, with brackets if necessary."""
         if not isinstance(x, Node):
             return self.literal(float(x) if isinstance(x, int) else x)
         if x in self.variables or x.op in self.code.identifiers:
@@ -248,7 +248,7 @@ class Writer:
         return _arithmetic(x, self.text, precedence)
 
     def expand(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
-        """Return an expression without variables."""
+        """Return an expression as code that contains inputs, but no other variables."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.identifiers:

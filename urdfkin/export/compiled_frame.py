@@ -3,8 +3,8 @@
 The first call of a quantity compiles exported C code with the system's compiler, and compares the results
 with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
-A cache stores the machine code with checksums. The key consists of the C code, the compiler and the
-processor. On Linux, the code is loaded from memory, because another program could change a file after the
+A cache stores the machine code with checksums. The key consists of the C code, the compiler, its options and
+the processor. On Linux, the code is loaded from memory, because another program could change a file after the
 test of the checksum. Other systems load the code from a temporary file.
 """
 
@@ -58,7 +58,10 @@ def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile one function, and load the library.
 
     The library's function `task` takes an array with the fields of `KernelArgs`. `task` returns 1 if an
-    input is not finite.
+    input is not finite, else 0.
+
+    Raises:
+        NoCompilerError: no C compiler is installed, or the compiler rejects the code.
     """
     if (compiler := shutil.which("cc")) is None:
         raise NoCompilerError("cc is not installed")
@@ -156,7 +159,7 @@ def _compiler_version(compiler: str) -> str:
 
 @cache
 def _processor_features() -> str:
-    """Return the features for `-march=native`."""
+    """Return the processor's features, on which the machine code of `-march=native` depends."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

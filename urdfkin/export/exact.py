@@ -78,7 +78,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def exact_angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Replace multiples of pi/12 by `PiMultiple`."""
+        """Replace an angle that is a multiple of pi/12 in double precision, except 0, by a `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_PI_MULTIPLE_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 

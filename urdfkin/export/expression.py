@@ -98,10 +98,7 @@ class Graph:
         return self.make_node(letter, index)
 
     def make_node(self, op: str, *operands: Any) -> Node:
-        """Return the node of an operation.
-
-        Equal operations share a node.
-        """
+        """Return the node of an operation; equal operations share a node."""
         key = (op, *operands)
         if (node := self._nodes.get(key)) is None:
             node = self._nodes[key] = Node(self, op, operands, len(self._nodes))
@@ -150,7 +147,7 @@ class Graph:
     def _record_equation_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
         """Wrap an equation, so that each new node stores the equation's number.
 
-        If an equation calls another equation, all nodes store the number of the first equation.
+        If an equation calls another equation, all nodes store the number of the calling equation.
         """
         found = _EQUATION_NUMBERS.match(equation.__doc__ or "")
         if found is None:

@@ -264,7 +264,7 @@ def _bounds_of_results(
 
 
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
-    """Return rounding errors (n,) in eps."""
+    """Return the rounding errors (n,) of one operation, in eps = 2^-23."""
     size = np.abs(x)
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
@@ -276,7 +276,7 @@ def _operation_error(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant_error(x: float) -> float:
-    """Return a constant's error in single precision, in eps."""
+    """Return the error of a constant that is rounded to single precision, in eps = 2^-23."""
     size = np.abs(x)
     return float(_add_range_error(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 

@@ -28,7 +28,7 @@ _STATE_SYMBOLS = {
 }
 _STATE_NAME = re.compile(r"(R|p|w|vel|alpha|acc)(\d+)_(\w+)")
 _FUNCTION_CALL = re.compile(r"\b(sin|cos|sqrt)\(")
-_RESULTS = {
+_RESULT_SYMBOLS = {
     "placement": "T",
     "velocity": "v",
     "jacobian": "J",
@@ -70,7 +70,7 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
         step, _, equations = head.partition(": ")
         yield rf"{latex_text(step)}{f' ({equations})' if equations else ''}:"
         yield from _align_lines(lines)
-    letter = _RESULTS[function.name]
+    letter = _RESULT_SYMBOLS[function.name]
     yield from _align_lines(
         (f"{letter}_{{{','.join(str(i + 1) for i in indices)}}}", value)
         for indices, value in zip(np.ndindex(function.shape), writer.results(), strict=True)

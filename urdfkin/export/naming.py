@@ -17,7 +17,7 @@ _MAX_COMMENT_LENGTH = 80
 
 
 def safe_name(name: str) -> str:
-    """Return a name of letters, digits and single underscores.
+    """Return a name of at most 40 letters, digits and single underscores.
 
     >>> safe_name("panda_joint1"), safe_name("*/ int x; //"), safe_name("%")
     ('panda_joint1', 'int_x', 'x')

@@ -46,7 +46,7 @@ from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations at which Pinocchio checks the results.
-#: Pinocchio also checks the results at the neutral configuration and the joint limits.
+#: Pinocchio also checks the results at the zero, lower-limit and upper-limit configurations.
 PROOF_SAMPLES = 100
 VECTOR_COUNT = 4
 
@@ -57,8 +57,8 @@ class ExportVector:
 
     Attributes:
         tolerances: Bounds in double precision, in eps.
-        single_tolerances: Bounds in single precision, in eps.
-            Without a bound, the value is 0.0.
+        single_tolerances: Bounds in single precision, in eps. Beyond the range of single precision, the value
+            is 0.0.
     """
 
     inputs: tuple[list[float], ...]
@@ -72,10 +72,9 @@ class Proof:
     """Test vectors and comparison with Pinocchio.
 
     Attributes:
-        single_precision_bounds: Largest bounds, in eps * scale.
-            Beyond the range of single precision, the bound is inf.
-            scale: upper bound on the sum of |term| over a number's terms
-        lock: Values of locked joints.
+        single_precision_bounds: Largest bound of each quantity, in eps * scale. The scale is an upper bound
+            on the sum of |term| over a number's terms. Beyond the range of single precision, a bound is inf.
+        lock: Names and values of locked joints.
     """
 
     sha256: str

@@ -101,7 +101,7 @@ def _numpy_first_lines(writer: Writer) -> list[str]:
 # -- array API ---------------------------------------------------------------------------------------------
 
 
-def _zero(writer: Writer, xp: str) -> str:
+def _zero_line(writer: Writer, xp: str) -> str:
     """Make code that creates zeros of the inputs' batch shape, type and device."""
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
@@ -129,14 +129,11 @@ def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
 def _array_first_lines(writer: Writer) -> list[str]:
     used = [name for name in _MATH_FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
     names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
-    return ["xp = _namespace(q)", *_input_check_lines(writer, "xp, "), *names, _zero(writer, "xp")]
+    return ["xp = _namespace(q)", *_input_check_lines(writer, "xp, "), *names, _zero_line(writer, "xp")]
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that stacks numbers.
-
-    Arrays may be immutable, as in JAX.
-    """
+    """Make a `Dialect.result` that stacks numbers, because arrays may be immutable, as in JAX."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -344,7 +341,7 @@ DIALECTS = {
         first_lines=lambda writer: [
             *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
             *_input_check_lines(writer),
-            _zero(writer, "jnp"),
+            _zero_line(writer, "jnp"),
         ],
         input_format="{}[..., {}]",
         result=_make_stacked_result(""),
@@ -368,7 +365,7 @@ DIALECTS = {
         )
         + "\n"
         + _STACKED.format(given="", xp="torch", axis="dim"),
-        first_lines=lambda writer: [*_input_check_lines(writer), _zero(writer, "torch")],
+        first_lines=lambda writer: [*_input_check_lines(writer), _zero_line(writer, "torch")],
         input_format="{}[..., {}]",
         result=_make_stacked_result(""),
         values_body="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"

@@ -79,8 +79,8 @@ class TreeRecursion(Recursion):
 
     def _apply_link_pose(self, s: LinkState, row: Sequence[float]) -> LinkState:
         R, d = row[: Geometry.OFFSET], row[Geometry.OFFSET : Geometry.MULTIPLIER]
-        x, y, z = _without_rounding(R[0:3]), _without_rounding(R[3:6]), _without_rounding(R[6:9])
-        return self.rotate_frame(self.translate_frame(s, _without_rounding(d)), (x, y, z))
+        x, y, z = _drop_tiny_entries(R[0:3]), _drop_tiny_entries(R[3:6]), _drop_tiny_entries(R[6:9])
+        return self.rotate_frame(self.translate_frame(s, _drop_tiny_entries(d)), (x, y, z))
 
     def _about_z(self, angle: Number) -> Matrix:
         found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0, 1)
@@ -128,7 +128,7 @@ class TreeRecursion(Recursion):
         return found
 
 
-def _without_rounding(x: Sequence[float]) -> Vector:
+def _drop_tiny_entries(x: Sequence[float]) -> Vector:
     """Replace entries below the largest entry's rounding error by 0.
 
     Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
@@ -175,11 +175,11 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 
 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the Hessian row by row.
+    """Return the Hessian (6, nv, nv) row by row.
 
-    The Hessian contains a matrix H_i (6, nv) for each coordinate i:
+    The Hessian contains a matrix H_i (6, nv) for each joint motion i:
 
-        H_i: derivative of the Jacobian with respect to coordinate i
+        H_i: derivative of the Jacobian with respect to joint motion i
         time derivative of the Jacobian = sum of H_i v_i (7.126)
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv

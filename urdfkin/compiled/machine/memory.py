@@ -251,10 +251,7 @@ def write_rows(m, scratch, rows, first, count, to, at, stride):
 
 @intrinsic
 def _prefetch(context: Any, x: Any, at: Any) -> Any:
-    """Load the cache line of `x[at]`.
-
-    An address beyond the array causes no error.
-    """
+    """Load the cache line of `x[at]`; an address beyond the array causes no error."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -340,10 +337,7 @@ def is_in_range(total):
 
 @intrinsic
 def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy eight numbers, bypassing the caches.
-
-    `to[at]` must begin a cache line.
-    """
+    """Copy eight numbers, bypassing the caches; `to[at]` must begin a cache line."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments

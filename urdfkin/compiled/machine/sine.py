@@ -51,7 +51,7 @@ def sine_cosine(scratch, row, x):
 
 @intrinsic
 def _small_sine_cosine(context: Any, x: Any) -> Any:
-    """Return sines and cosines below `LARGEST_ANGLE`."""
+    """Return sines and cosines of angles below `LARGEST_ANGLE`; other results are not valid."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments

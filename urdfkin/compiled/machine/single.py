@@ -69,7 +69,7 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
 #: `_NATIVE` is the native byte order.
 #: `_DOUBLE` is the type number of doubles.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
-_HALF, _BYTE = 0xFFFFFFFF, 0xFF
+_FOUR_BYTE_MASK, _BYTE_MASK = 0xFFFFFFFF, 0xFF
 #: `_READABLE` has NumPy's flags of an input array: C-contiguous and aligned.
 #: `_WRITABLE` has NumPy's flags of an output array: C-contiguous, aligned and writable.
 _READABLE, _WRITABLE = 0x101, 0x501
@@ -112,16 +112,15 @@ def _clear_flag(context: Any, numbers: Any, index: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles.
+    """Return the address of the doubles; 0 for unsupported arrays.
 
-    The address is 0 for unsupported arrays. The array must have `axes` axes and the shape (rows, columns,
-    columns, ...).
+    The array must have `axes` axes and the shape (rows, columns, columns, ...).
     """
     x = integers_at(array)
-    if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
+    if x[_TYPE] != ndarray or x[_NDIM] & _FOUR_BYTE_MASK != axes or x[_FLAGS] & flags != flags:
         return 0
     kind, shape = integers_at(x[_KIND])[_KIND_AND_ORDER], integers_at(x[_SHAPE])
-    if kind >> 32 != _DOUBLE or kind >> 16 & _BYTE != _NATIVE:
+    if kind >> 32 != _DOUBLE or kind >> 16 & _BYTE_MASK != _NATIVE:
         return 0
     shape_matches = shape[0] == rows
     for axis in range(1, axes):
@@ -218,10 +217,10 @@ def array_layout_is_known() -> bool:
     word = ctypes.POINTER(ctypes.c_int64)
     own, kind = (ctypes.cast(id(part), word) for part in (x, x.dtype))
     return (
-        (own[_TYPE], own[_DATA], own[_NDIM] & _HALF) == (id(np.ndarray), x.ctypes.data, 2)
+        (own[_TYPE], own[_DATA], own[_NDIM] & _FOUR_BYTE_MASK) == (id(np.ndarray), x.ctypes.data, 2)
         and ctypes.cast(own[_SHAPE], word)[:2] == [2, 3]
         and (own[_KIND], own[_FLAGS] & _WRITABLE) == (id(x.dtype), _WRITABLE)
-        and (kind[_KIND_AND_ORDER] >> 32, kind[_KIND_AND_ORDER] >> 16 & _BYTE) == (x.dtype.num, _NATIVE)
+        and (kind[_KIND_AND_ORDER] >> 32, kind[_KIND_AND_ORDER] >> 16 & _BYTE_MASK) == (x.dtype.num, _NATIVE)
     )
 
 
@@ -243,8 +242,8 @@ def make_single_evaluator(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Make a function for one configuration.
 
-    The tree must have one frame and a fixed base. The returned array contains the kernel's arguments.
-    The function counts its valid results in `KernelArgs.COUNT`.
+    `plan` must have one frame. The base is fixed at the world's origin. The returned array contains the
+    kernel's arguments. The function counts its valid results in `KernelArgs.COUNT`.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
