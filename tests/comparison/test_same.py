@@ -23,6 +23,7 @@ from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.certificate import SAME, certificate, difference_text, recheck
 from urdfkin.comparison.result import Sameness, Verdict
+from urdfkin.comparison.verdict import Comparator
 from urdfkin.dh import make_dh_table
 from urdfkin.model.mechanisms.joint_matching import Axis
 from urdfkin.model.mechanisms.matcher import MechanismMatcher
@@ -45,6 +46,26 @@ def test_a_robot_is_the_same_as_itself_and_pinocchio_finds_no_distance() -> None
     assert (found.after, found.differences, found.remarks) == ((), (), ())
     assert str(found.confirmation).endswith("finds at most 0 m at 8 configurations, within the bounds")
     assert found.worst is None
+
+
+@pytest.mark.parametrize("bounds", [True, False])
+def test_a_distance_that_pinocchio_finds_between_equal_robots_is_an_error(
+    bounds: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a = urdfkin.load("ur5")
+    rounding = urdfkin.same(a, a, bounds=False).rounding[0]
+
+    def distances(self: Comparator, alignment: Alignment, variables: object) -> FloatArray:
+        return np.full(len(alignment.frames), 1.01 * rounding)
+
+    monkeypatch.setattr(Comparator, "pinocchio_distances", distances)
+    with pytest.raises(urdfkin.UrdfkinError, match="Pinocchio finds a distance above the proven bound"):
+        urdfkin.same(a, a, bounds=bounds)
+
+
+def test_different_robots_without_bounds_are_not_called_confirmed() -> None:
+    found = urdfkin.same("ur5", "ur10", bounds=False).confirmation
+    assert str(found) == "not checked by Pinocchio: bounds=False, so there is no bound to check"
 
 
 def _tried(

@@ -192,7 +192,9 @@ class Comparator:
         variables = variables_of(alignment, self.tolerance)
         result = self.result_without_bounds(alignment, variables)
         if not self.bounds:
-            return replace(result, confirmation=self._confirm(alignment, variables, ()))
+            return replace(
+                result, confirmation=self._confirm(alignment, variables, _bound_of_verdict(result))
+            )
         frames = self._intervals(alignment, variables)
         farthest, bound = None, _largest([(frame.upper, frame.radians) for frame in frames])
         if result.after:
@@ -202,7 +204,7 @@ class Comparator:
             bound = self._bound_as_written(written, moving, farthest)
             if len(written.frames) < len(self._comparable_links(alignment)):
                 bound = math.inf, math.inf
-        checked = self._confirm(alignment, variables, frames)
+        checked = self._confirm(alignment, variables, [frame.upper for frame in frames])
         return replace(
             result, frames=frames, as_written=farthest, bound_as_written=bound, confirmation=checked
         )
@@ -476,20 +478,26 @@ class Comparator:
         return Interval(*names, lower, *upper, radians, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
     def _confirm(
-        self, alignment: Alignment, variables: Variables, frames: tuple[Interval, ...]
+        self, alignment: Alignment, variables: Variables, bounds: Sequence[float] | float | None
     ) -> Confirmation:
+        """Check bounds (m) on the distances of frames: one bound for each frame, or one for all frames."""
+        if bounds is None:
+            return Confirmation("not asked", reason="bounds=False, so there is no bound to check")
         if not all(as_verify(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
             if (reason := robot.verifier.find_refusal()) is not None:
                 return Confirmation("not verified", reason=reason)
         distances = self.pinocchio_distances(alignment, variables)
-        for interval, metres in zip(frames, distances, strict=False):
-            if not metres <= interval.upper * (1.0 + EPS):
+        links = self.trees[0].links
+        for frame, metres, bound in zip(
+            alignment.frames, distances, np.broadcast_to(bounds, distances.shape), strict=True
+        ):
+            if not metres <= bound * (1.0 + EPS):
                 raise UrdfkinError(
                     "Pinocchio finds a distance above the proven bound",
-                    where=f"frame {interval.frame}",
-                    found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
+                    where=f"frame {links[frame.a]}",
+                    found=f"{metres:.6g} m, bound {bound:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
         return Confirmation(
@@ -506,6 +514,15 @@ class Comparator:
         q_a, q_b = search.configurations(search.random_values(CONFIRMATION_SAMPLES), random_free_joints=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
         return np.asarray(distances.max(axis=0, initial=0.0))
+
+
+def _bound_of_verdict(result: Sameness) -> float | None:
+    """Return the bound (m) on all distances that follows from the verdict; None for models that differ."""
+    if result.verdict is Verdict.DIFFERS:
+        return None
+    if result.verdict is Verdict.UP_TO_SINGLE and result.single is not None:
+        return result.single[0]
+    return result.rounding[0]
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
