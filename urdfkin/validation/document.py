@@ -295,7 +295,7 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Two comparisons with a second oracle: of urdfkin, and of Pinocchio.
+    """Two comparisons: urdfkin with a second oracle, and Pinocchio with the second oracle.
 
     The entry exists only if there is a second oracle.
     """
