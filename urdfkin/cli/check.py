@@ -309,7 +309,7 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
       urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
-    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
+    """  # noqa: D301  click needs the character "\b"
     if options["fix"] and options["diff"]:
         reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):

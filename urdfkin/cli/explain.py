@@ -93,7 +93,7 @@ def explain_command(topic: str | None) -> None:
       urdfkin explain 7.130
       urdfkin explain reference-frames
       urdfkin explain jacobian
-    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
+    """  # noqa: D301  click needs the character "\b"
     rules = (*URDF_RULES.values(), *MJCF_AND_USD_RULES.values())
     if topic is None:
         for rule in rules:

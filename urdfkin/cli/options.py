@@ -205,7 +205,7 @@ def root_joint_option(help_: str) -> Callable[[_F], _F]:
 robot_options = combine(
     mimic_option(
         "Couple each mimic joint to the joint that it mimics, as in the URDF.",
-        "mimic; no-mimic for a few robots that `urdfkin robots` lists",
+        "mimic; for some robots of the catalogue no-mimic, see `urdfkin robots`",
     ),
     root_joint_option("Add a moving joint between the world and the root link."),
     source_options,

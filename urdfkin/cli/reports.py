@@ -190,7 +190,7 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 
     Exit 0: no regression. 1: a regression. 2: a file cannot be used. For example, the file states more
     samples for a robot than the validation requested.
-    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
+    """  # noqa: D301  click needs the character "\b"
     from urdfkin.report.compare import compare, document, markdown_of
     from urdfkin.report.reading import read_document
 

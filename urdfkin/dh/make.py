@@ -23,7 +23,7 @@ from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
 #: If alpha, a or d differ by more than this number, two tables describe different robots.
-#: Cells are ignored if base, tool or a prismatic axis can compensate for their difference.
+#: A cell is ignored if base, tool or a prismatic axis can compensate for the difference in this cell.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_CELL_DIFFERENCE = 0.1
 #: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.

@@ -65,7 +65,7 @@ _TITLE = re.compile(
 _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 _NUMBER_COLUMNS = (*COLUMNS, "beta", "offset")
 _COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
-#: A number such as 1,000: one with a decimal comma, or a thousand.
+#: A number such as 1,000 can mean 1 or 1000.
 _THOUSANDS = re.compile(r"(?<![0-9.,])[1-9][0-9]{0,2}(,[0-9]{3})+(?![0-9,])")
 
 

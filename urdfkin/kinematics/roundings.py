@@ -249,7 +249,7 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: `eps * scale` for the smallest nonzero scale, `SMALLEST_NORMAL`: the smallest subnormal number.
+#: Value of `eps * scale` for the smallest nonzero scale (`SMALLEST_NORMAL`).
 SMALLEST_SUBNORMAL = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300

@@ -83,7 +83,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Group robots without checks by verdict and reason; return the names in groups of more than four.
+    """Return the names of robots without checks, grouped by verdict and reason, for groups of more than four.
 
     For example, all robots that an interrupted validation did not reach have the same reason.
     """

@@ -472,7 +472,7 @@ class Reporter:
     #: The last element that `_spans` read, and its result.
     _cached_element: Element | None = None
     _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
-    #: Elements of findings that are added before the call of `silence`, by the id of the finding.
+    #: For each finding that is added before the call of `silence`: its element, by the id of the finding.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(

@@ -314,7 +314,7 @@ def read_usd(
 
 
 def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants of a stage, and return the paths of the instances that the function expands.
+    """Select variants of a stage, expand its instances, and return the paths of the expanded instances.
 
     OpenUSD cannot select a variant inside an instance. If a prim inside an instance has the variant set, the
     function expands the instance: the instance becomes an ordinary prim. The function writes only to the

@@ -22,7 +22,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks in the executor: submitted, and without an answer that the engine has taken.
+#: Maximum number of chunks that are submitted to the executor and whose answers are not taken yet.
 MAX_IN_FLIGHT = 512
 
 

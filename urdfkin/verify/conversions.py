@@ -95,7 +95,7 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
         if not joint.backwards and not joint.kind.turns:
             expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
     differences = np.abs(ours - expected)[:, :, :3]
-    # `np.maximum` and `not ... <= 1` treat NaN as a disagreement.
+    # NaN is a disagreement: `np.maximum` returns NaN, and `not nan <= 1` is true.
     metres = differences[..., 3].max(initial=0.0)
     direction = np.maximum(differences[..., 2].max(initial=0.0), differences[:, -1, :, :3].max(initial=0.0))
     ends = [i for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]

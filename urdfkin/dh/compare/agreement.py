@@ -50,8 +50,8 @@ _MAX_CELLS_ERROR_FRACTION = 0.5
 #: It is also accepted if the tip error is at most this fraction of the tip error without the correction.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: The cells that differ without a fit are reported only if:
-#: their number <= number of cells that are reported after a fit + this number
+#: More cells can differ without a fit than after a fit.
+#: The cells that differ without a fit are reported only if there are at most this number more.
 _MAX_MORE_UNFITTED_CELLS = 2
 #: The reach is computed from the positions of the tip.
 #: If the tip moves at most this fraction of the path length, the path length replaces the reach.

@@ -45,8 +45,8 @@ _IS_ANGLE = np.array([motion.turns for motion in _CELL_MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: The fit of the cells ends when the norm of the 6 s errors (s samples) no longer decreases,
-#: and the norm is at most 6 s * reach * this number.
+#: The fit of the cells ends if the norm of the 6 s errors (s samples) no longer decreases. The norm must also be
+#: at most 6 s * reach * this number.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -60,16 +60,19 @@ _LAST_CELL_WEIGHT = 1.2
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: The fit tries large changes of joint offsets only if: root mean square error > this number * reach
+#: The fit tries large changes of joint offsets only if the root mean square error exceeds this fraction of
+#: the reach.
 _EXACT_FIT_ERROR = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _EXACT_TIP_ERROR = 1e-12
-#: Other joint signs are accepted if: tip error < this number * smallest tip error of earlier joint signs
+#: Other joint signs are accepted only if their tip error is below this fraction of the smallest earlier tip
+#: error.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: Another fit starts with fitted translations if: tip error of this start <= this number * reach
+#: Another fit starts with fitted translations if the tip error of this start is at most this fraction of the
+#: reach.
 _CLOSE_START = 1e-6
-#: Large changes (rad) of two consecutive joint offsets: theta_i += angle, theta_{i+1} -= angle
-#: If alpha is nearer to pi than to 0, theta_{i+1} += angle.
+#: Large changes (rad) of two consecutive joint offsets. theta_i increases by the angle, and theta_{i+1}
+#: decreases by the angle. If alpha is nearer to pi than to 0, theta_{i+1} increases too.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)
