@@ -495,7 +495,7 @@ class Conversion:
                 raise InputError(
                     "the value of a mimic joint contradicts its mimic rule",
                     where=column.name,
-                    found=f"{difference:.3g} rad or m from the rule",
+                    found=f"a difference of {difference:.3g}, in the unit of this value in the convention",
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
                     question=QuestionsSection.MIMIC_JOINTS,
                 )
@@ -807,15 +807,8 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
         if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
             return None
         own, other = start._columns, end._columns
-        index = tuple(
-            next(
-                k
-                for k, c in enumerate(own)
-                if (c.index, c.cos_or_sin) == (x.index, x.cos_or_sin) and not c.is_mimic
-            )
-            for x in other
-        )
-        if any(
+        index = tuple(k for x in other if (k := _find_source(own, x)) is not None)
+        if len(index) < len(other) or any(
             x.cos_or_sin and (x.factor, x.zero) != (own[k].factor, own[k].zero)
             for k, x in zip(index, other, strict=True)
         ):
@@ -837,6 +830,19 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
     pairs = zip(end._rates, index, strict=True)
     factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
     return Reordering(index, factors, (0.0,) * len(index))
+
+
+def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int | None:
+    """Return the index of a number that determines `target`, or None.
+
+    A mimic joint is used only if no other number determines `target`.
+    """
+    candidates = (
+        k
+        for k, x in enumerate(numbers)
+        if (x.index, x.cos_or_sin) == (target.index, target.cos_or_sin) and x.factor
+    )
+    return min(candidates, key=lambda k: numbers[k].is_mimic, default=None)
 
 
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
