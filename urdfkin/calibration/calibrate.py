@@ -384,7 +384,7 @@ def _check_measured(
     """Return (samples, n) values of the path's independent joints, and the measured poses."""
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
-        path_q = model.coupling.parse(q, "q")
+        path_q = as_finite(model.coupling.parse(q, "q"), "q")
     else:
         path_q = model.coupling.select(
             robot.tree, np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
