@@ -184,7 +184,7 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merge_fixed: bool
     ) -> list[int]:
-        """Sort the joints breadth first, and siblings by `keys`.
+        """Sort siblings by `keys`.
 
         If `merge_fixed` is true, links that a fixed joint connects count as one link.
         """
@@ -287,7 +287,7 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return (3,) in the link's frame, m."""
+        """Return the centre of mass (3,) in the link's frame, m; 0 without an inertial origin."""
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -392,6 +392,7 @@ class Conversion:
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
+            UnknownNameError: A coordinate, joint velocity or named pose is unknown.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)

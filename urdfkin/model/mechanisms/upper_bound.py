@@ -361,8 +361,8 @@ def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after a joint's motion and L."""
-    # Planar and floating joints rotate without limits, so they allow every direction of d.
-    # Therefore, the new support function of d is h(u) = |u| max |d|.
+    # A planar or floating joint rotates d without limits, and a floating joint to every direction.
+    # Therefore, h(u) = |u| max |d| is an upper bound on the new support function of d.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -647,10 +647,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a copy of a joint pair without translations.
-
-    Translations do not change free vectors.
-    """
+    """Return a copy without translations, because translations do not change free vectors."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
