@@ -47,6 +47,7 @@ from urdfkin.model.tree import (
 )
 
 #: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
+#: If the limits of a joint allow only larger values, `sample` draws larger values.
 #: For a revolute or prismatic joint without limits, `sample` draws from -10 to 10 (rad or m).
 #: For a continuous joint, `sample` draws from -pi to pi.
 #: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
@@ -109,7 +110,8 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the range of each joint with one coordinate, within -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`.
 
-    Limits of mimic joints are ignored.
+    If the limits exclude this interval, the range begins at the limit nearest to 0, with at most the length
+    `ASSUMED_LIMIT`. Limits of mimic joints are ignored.
     """
 
     def own_range(joint: Joint) -> tuple[float, float]:
@@ -117,8 +119,10 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
             return -math.pi, math.pi
         if joint.limit is None:
             return -ASSUMED_LIMIT, ASSUMED_LIMIT
-        lower, upper = np.clip((joint.limit.lower, joint.limit.upper), -ASSUMED_LIMIT, ASSUMED_LIMIT).tolist()
-        return min(lower, upper), max(lower, upper)
+        lower, upper = sorted((joint.limit.lower, joint.limit.upper))
+        centre = lower if lower >= ASSUMED_LIMIT else upper if upper <= -ASSUMED_LIMIT else 0.0
+        lower, upper = np.clip((lower, upper), centre - ASSUMED_LIMIT, centre + ASSUMED_LIMIT).tolist()
+        return lower, upper
 
     return {joint.name: own_range(joint) for joint in tree.joints if joint.nq == 1}
 
