@@ -729,7 +729,7 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
 #: Five prismatic joints have 120 orders.
 MAX_ORDERS = 120
 #: Maximum number of later joint pairs that a search compares; see `LookAhead`.
-#: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
+#: Without names and without an exact match, the robot TALOS needs up to 500 pairs, and Baxter up to 1,000.
 MAX_LOOK_AHEAD_PAIRS = 2000
 #: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
@@ -898,7 +898,6 @@ class _RulePair:
         return (self.constant_a + self.offset + 2.0 * math.pi * turn - self.constant_b) / self.slope_b
 
     def offset_from_beta(self, beta: float) -> float:
-        """Return o for a given beta."""
         return self.slope_b * beta + self.constant_b - self.constant_a
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:

@@ -226,11 +226,7 @@ def point_support(grid: Grid, p: FloatArray) -> Support:
 
 
 def _polygon_around_arc(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Enclose an arc of the unit circle in a polygon.
-
-    Returns:
-        Angle (rad) of each corner, and its distance from the circle's centre.
-    """
+    """Return the angle (rad) of each corner, and the distance of the corner from the circle's centre."""
     if high - low >= _FULL_TURN:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
@@ -564,11 +560,7 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield upper bounds on the second derivatives of D with respect to two joints.
-
-    Yields:
-        Indices i and j <= i of the joints, and the bound.
-    """
+    """Yield the indices i and j <= i of two joints, and a bound on the second derivative of D."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
