@@ -196,6 +196,15 @@ def test_invalid_calibration_input_is_reported(change: dict[str, object], words:
     assert words in str(error.value)
 
 
+def test_a_joint_value_of_a_table_must_be_finite() -> None:
+    dh = table(DHConvention.STANDARD)
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(dh.joint_names)))
+    poses = dh.placement(q)
+    q[3, 1] = np.nan
+    with pytest.raises(InputError, match="q must be finite: found nan"):
+        calibrate(dh, q, poses, fit=["offsets"])
+
+
 def test_an_unknown_set_of_parameters_lists_similar_names() -> None:
     with pytest.raises(UnknownNameError, match="offsets"):
         calibrate("ur5", fit=["offset"])

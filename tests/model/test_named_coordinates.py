@@ -116,6 +116,21 @@ def test_values_that_look_like_degrees_get_a_hint(arm: Robot) -> None:
     assert "degrees" not in " ".join(arm.limit_violations([30.0, 0.0, 1.0])), "metres"
 
 
+@pytest.mark.parametrize(
+    ("lower", "upper", "largest"),
+    [(12, 15, 15), (-15, -12, 15), (10, 11, 11), (12, 1e6, 22), (-1e6, 1e6, 10)],
+)
+def test_samples_and_ready_are_within_limits_far_from_zero(
+    lower: float, upper: float, largest: float
+) -> None:
+    text = urdfs.robot(joint("slide", "prismatic", "a", "b", more=limit(lower, upper)))
+    slide = urdfkin.load(text, verify=False)
+    q = np.vstack([slide.sample(1000), slide.poses["ready"]])
+    assert slide.limit_violations(q) == []
+    assert np.ptp(q[:-1]) > 0.0
+    assert 0.99 * largest < np.abs(q).max() <= largest
+
+
 def test_ready_is_within_the_limits_of_mimic_joints(arm: Robot) -> None:
     assert arm.limit_violations("neutral") != []
     assert arm.limit_violations("ready") == []

@@ -130,7 +130,7 @@ class Calibration:
 
     @cached_property
     def changes(self) -> FloatArray:
-        """(p,) changes of the parameters, m and rad.
+        """(p,) changes of the parameters: m, rad, and gains without a unit.
 
         A fixed parameter of a joint has the change 0. A fixed parameter of base or tool has its start value.
         """
@@ -254,8 +254,8 @@ def calibrate(
         poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m. If `fit` contains
             "base", the poses are in the instrument's frame. If `fit` contains "tool", they are poses of the
             target.
-        tip: Name of a link or joint; the robot's tip when None.
-        base: Name of a link or joint; the robot's base frame when None.
+        tip: Name of a link or joint; the robot's tip when None. Without effect for a table.
+        base: Name of a link or joint; the robot's base frame when None. Without effect for a table.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
             six numbers of each joint origin, or the cells of a table. A table's row has the cell beta only if
@@ -272,7 +272,8 @@ def calibrate(
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
-        InputError: an array has a wrong shape, there are no poses, or the positions are not in metres.
+        InputError: an array has a wrong shape, a number is not finite, there are no poses, or the positions
+            are not in metres.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
@@ -384,7 +385,7 @@ def _check_measured(
     """Return (samples, n) values of the path's independent joints, and the measured poses."""
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
-        path_q = model.coupling.parse(q, "q")
+        path_q = as_finite(model.coupling.parse(q, "q"), "q")
     else:
         path_q = model.coupling.select(
             robot.tree, np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
@@ -529,10 +530,7 @@ def _find_poorly_observable(
 
 
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
-    """Compare the written model with Pinocchio.
-
-    A URDF cannot contain base, tool or gains. The comparison therefore sets base, tool and gains to 0.
-    """
+    """A URDF cannot contain base, tool or gains. The comparison therefore sets base, tool and gains to 0."""
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:
         return None

@@ -1,4 +1,4 @@
-"""Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
+"""Check the plausibility of a fit, and find the likeliest mistake in the data of an implausible fit.
 
 Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
 joint is reversed. A fit is refused for any of these reasons:
@@ -11,6 +11,7 @@ joint is reversed. A fit is refused for any of these reasons:
 - The orientation error, the tilt of a joint's axis, or the change of a gain is large.
 - The fit has no redundancy.
 - Joint values look like degrees.
+- The fit is suspicious, and a correction of a common mistake in the data makes the fit much more accurate.
 
 To find the mistake behind a refused or suspicious fit, the module corrects common mistakes in the data, one
 at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest
@@ -48,7 +49,7 @@ _MAX_ERROR_OF_REACH = 0.05
 #:     error     rms position error
 #:     spread    rms distance of the measured positions from their mean
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: A fit is not plausible if it hardly reduces a large error:
+#: A fit is not plausible if the fit hardly reduces a large error:
 #:     error > _NO_BETTER_OF_REACH * reach and error > _NO_BETTER_OF_BEFORE * error_before
 #:     error           rms position error
 #:     error_before    rms position error of a fit of base and tool alone
@@ -75,8 +76,8 @@ _CHANGE_MARGIN_SIGMAS = 5.0
 #:     ratio = _MAX_IMPROVED_ERROR_RATIO    otherwise
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
-#: Largest number of corrections after which all parameters are fitted again.
-#: The corrections are tried in ascending order of `_Trial.error_before`.
+#: The corrections are sorted by `_Trial.error_before`, the smallest first.
+#: Only for this number of corrections, all parameters are fitted again.
 _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.
 #: urdfkin tries these shifts (number of rows).
@@ -123,6 +124,7 @@ class FitWithData:
         """Reach of the original model at the measured configurations, m.
 
         The reach is the largest distance between the tip and the base, or between the tip and a joint axis.
+        Only revolute joints with a parameter for the zero position count.
         The reach is at most `characteristic_length`.
         """
         chain = self.model.chain
@@ -180,9 +182,9 @@ class FitWithData:
             yield f"the fit scales the values of joint {_join_names(gained.values())}"
 
     def half_turn_zeros(self) -> list[str]:
-        """Return the joints whose zero positions changed by about half a turn.
+        """Describe the joints with a change of the zero position by about half a turn.
 
-        Wrong signs of the next joint's values can cause such a change.
+        Wrong signs of the next joint's values can cause this change.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -193,7 +195,10 @@ class FitWithData:
         ]
 
     def _joint_parameter_changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield parameter, change and lower bound of |change|, for moving joints."""
+        """Yield (parameter, change, lower bound of |change|) for the parameters of moving joints.
+
+        If only positions are measured, joints with an axis that is near the target in all poses are skipped.
+        """
         model, fitted = self.model, self.full_fit
         near = set[str]()
         if not self.measurements.full_poses:

@@ -59,8 +59,8 @@ _ORIGIN_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 #: The check of the new URDF uses the same number of configurations.
 _FIT_SAMPLES = 40
 _FIT_SEED, _CHECK_SEED = 2, 3
-#: Largest residual of the fit, in metres and in radians.
-#: The calibration file rounds numbers to nine digits, which causes residuals near this limit.
+#: Largest residual of the fit, and largest difference of the new URDF's poses (m and rad).
+#: If the joint origins can represent the calibrated arm, the residual is a rounding error of about 1e-15.
 _MAX_RESIDUAL = 1e-8
 _DISPLACEMENT_SAMPLES = 1000
 

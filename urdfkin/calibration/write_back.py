@@ -69,7 +69,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Return three numbers as text; a number equal to `old` up to rounding keeps its digits."""
+    """A number that is equal to `old` up to rounding keeps its digits."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(

@@ -268,6 +268,7 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             lengths.append(length)
             pose_counts.append(count)
             # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
+            # Before the motion is a rotation to the axis. The rotation and the pose each count as one pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

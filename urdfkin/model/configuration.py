@@ -47,6 +47,7 @@ from urdfkin.model.tree import (
 )
 
 #: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
+#: If the limits of a joint allow only larger values, `sample` draws larger values.
 #: For a revolute or prismatic joint without limits, `sample` draws from -10 to 10 (rad or m).
 #: For a continuous joint, `sample` draws from -pi to pi.
 #: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
@@ -107,15 +108,21 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the ranges of joints with one coordinate; ignore limits of mimic joints."""
+    """Return the range of each joint with one coordinate, within -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`.
+
+    If the limits exclude this interval, the range begins at the limit nearest to 0, with at most the length
+    `ASSUMED_LIMIT`. Limits of mimic joints are ignored.
+    """
 
     def own_range(joint: Joint) -> tuple[float, float]:
         if joint.kind is JointKind.CONTINUOUS:
             return -math.pi, math.pi
         if joint.limit is None:
             return -ASSUMED_LIMIT, ASSUMED_LIMIT
-        lower, upper = np.clip((joint.limit.lower, joint.limit.upper), -ASSUMED_LIMIT, ASSUMED_LIMIT).tolist()
-        return min(lower, upper), max(lower, upper)
+        lower, upper = sorted((joint.limit.lower, joint.limit.upper))
+        centre = lower if lower >= ASSUMED_LIMIT else upper if upper <= -ASSUMED_LIMIT else 0.0
+        lower, upper = np.clip((lower, upper), centre - ASSUMED_LIMIT, centre + ASSUMED_LIMIT).tolist()
+        return lower, upper
 
     return {joint.name: own_range(joint) for joint in tree.joints if joint.nq == 1}
 
@@ -168,7 +175,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # Rounding errors narrow the range at each end.
+    # Move each end inwards by the rounding error, so that the mimic joint is within its limits.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
     if not math.isfinite(error):  # With only one limit, `size` and `error` are infinite.
@@ -182,10 +189,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
 
 
 def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
-    """Widen limits by one unit in the last place.
-
-    Parsing rounds a decimal limit.
-    """
+    """Widen limits by one unit in the last place, because parsing rounds decimal limits."""
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
@@ -571,8 +575,8 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             mimic_joints.append((joint, tree.q_index[i], values))
         else:
             own[..., tree.q_index[i] : tree.q_index[i] + joint.kind.nq] = values
-    for joint, leader_at, values in mimic_joints:
-        _check_mimic_rule(joint, own[..., leader_at], values[..., 0])
+    for joint, mimicked_at, values in mimic_joints:
+        _check_mimic_rule(joint, own[..., mimicked_at], values[..., 0])
     return own
 
 

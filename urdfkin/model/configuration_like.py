@@ -9,7 +9,7 @@
 | a mapping from names to numbers, text or batches | `{"shoulder": "30deg", "elbow": [0.1, 0.2]}` |
 | a pandas Series or DataFrame, or another table with named columns | read as a mapping |
 
-Without a named pose, a missing name is an error; a missing value is never 0.
+Without a named pose, a missing name is an error.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 For a configuration q with orientations, q + v is meaningless; use `integrate` and `difference` instead of +
 and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
-`integrate` adds and `difference` subtracts. For a planar or floating joint, the joint velocity (w, s) is
+`integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns.
+For a planar or floating joint, the joint velocity (w, s) is
 constant in the moving frame, so the joint makes a screw motion:
 
     R = R_0 exp(w)
@@ -53,7 +54,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the velocities that lead to `end` in one second.
 
-    Continuous and planar joints rotate by the smaller angle.
+    Continuous, planar and floating joints rotate by at most half a turn.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))

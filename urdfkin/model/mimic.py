@@ -1,7 +1,8 @@
 """The map from a path's coordinates q to the values G q + g of its joints, including mimic joints.
 
-The coordinates of a path are its independent joints, in path order. A mimic joint has no coordinate: its
-value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if the path
+The coordinates of a path are the independent joints that determine its joint values. The order of these
+coordinates is that of their first use on the path. A mimic joint has no coordinate; the value of a mimic
+joint is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if the path
 does not contain the mimicked joint.
 """
 
@@ -40,7 +41,7 @@ class Coupling:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the independent joints, in path order."""
+        """Names of the path's coordinates, in the order of their first use on the path."""
         return tuple(dict.fromkeys(self._coordinate_by_joint))
 
     @cached_property

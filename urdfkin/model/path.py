@@ -67,8 +67,8 @@ class Path:
         return frames
 
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
-        """The yielded poses may share memory."""
-        # A motion by 0 changes nothing and is skipped.
+        """Yield poses that may share memory."""
+        # A motion that is 0 in all samples is skipped.
         moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         k = 0

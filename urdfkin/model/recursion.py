@@ -110,10 +110,7 @@ class Recursion:
         return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
-        """Return the state after a planar or floating joint.
-
-        `rates`: linear and angular joint velocity, then joint acceleration, in the child link's axes.
-        """
+        """`rates`: linear and angular joint velocity, then joint acceleration, in the child link's axes."""
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
         return replace(
@@ -124,7 +121,9 @@ class Recursion:
             acc=eq.free_acceleration(s.acc, s.w, o, u, u_rate),
         )
 
-    # -- quantities of a frame; columns are in the world's axes --------------------------------------
+    # -- quantities of a frame -----------------------------------------------------------------------
+    # `velocity` and `acceleration` return vectors in the axes of `own_axes`.
+    # `Reference.WORLD`, `in_reference` and all methods with columns need `own_axes` = False.
 
     def velocity(self, s: LinkState, reference: Reference) -> tuple[Vector, Vector]:
         """Return the linear and angular velocity (7.127, 7.128)."""

@@ -61,7 +61,7 @@ class JointTable(dict[str, Joint], Displayable):
 
 
 def tree_guides(tree: KinematicTree) -> Iterator[str]:
-    """Yield box-drawing characters before link names."""
+    """Yield the box-drawing characters before each link's name."""
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1

@@ -75,7 +75,7 @@ class JointKind(Enum):
     nq: int
     nv: int
     nq_pinocchio: int  #: Number of coordinates in Pinocchio, for example 2 for (cos, sin).
-    has_axis: bool  #: Whether joints of this kind have an axis.
+    has_axis: bool  #: Whether the joint rotates about, or translates along, one axis.
     turns: bool
     has_limits: bool  #: Whether joints of this kind have position limits.
 
@@ -156,6 +156,7 @@ class Joint:
     Attributes:
         parent: Index of the parent link.
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, m.
+            For a locked joint: pose of the child link's frame.
         axis: (3,) unit axis in the joint frame. A planar, floating or fixed joint has (1, 0, 0).
             A locked joint keeps its axis.
         pinocchio_tilt: Angle between `axis` and Pinocchio's axis, rad.
@@ -327,7 +328,10 @@ class KinematicTree:
 
     @cached_property
     def plausible_angle_ranges(self) -> FloatArray:
-        """Smallest and largest plausible angles (2, nq), rad."""
+        """Smallest and largest plausible angles (2, nq), rad.
+
+        The range is infinite for coordinates that are not angles, and for angles without limits.
+        """
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
@@ -482,9 +486,9 @@ def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Fix joints at values, rad or m.
+    """Lock joints at values, rad or m.
 
-    Joints that mimic a fixed joint are fixed too.
+    Joints that mimic a locked joint are locked too.
     """
     independent_joints = [joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in tree.joints]
     joints = [

@@ -21,7 +21,14 @@ from urdfkin.comparison.result import Sameness
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
-from urdfkin.model.conventions import BUILT_IN_NAMES, Convention, Conversion, as_toml, find_convention
+from urdfkin.model.conventions import (
+    BUILT_IN_NAMES,
+    Convention,
+    Conversion,
+    as_toml,
+    find_convention,
+    find_reordering,
+)
 from urdfkin.model.conventions import convention as module
 from urdfkin.model.conventions.convention import JointRule, parse_convention, spell_name
 from urdfkin.model.reference import Reference
@@ -435,6 +442,33 @@ def test_a_mimicked_joint_of_one_model_may_be_a_mimic_joint_of_the_other() -> No
     assert np.allclose(conversion.from_([0.7]), [0.3], 0, 1e-15)
     J = a.with_convention(found.convention()).jacobian([0.7], "l2")
     assert np.allclose(J, b.jacobian([0.7], "l2"), 0, 1e-15)
+
+
+def test_a_reordering_from_a_mimic_joint_uses_the_mimic_rule(tmp_path: Path) -> None:
+    arm = arm_with(rule_of_b=mimic("a", 2, 0.1))
+    (tmp_path / "mimic.toml").write_text('joints = ["b"]\nangle = "deg"\n')
+    start, end = arm.convention(str(tmp_path / "mimic.toml")), arm.convention("mujoco")
+    for one, other in ((start, start), (start, end), (end, start)):
+        found = find_reordering("q", one, other)
+        assert found is not None
+        q = one.to([0.3])[list(found.index)] * found.factor + found.zero
+        assert np.allclose(q, other.to([0.3]), 0, 1e-13)
+
+
+def test_no_reordering_converts_the_cosine_of_a_joint_to_the_angle_of_its_mimic_joint(tmp_path: Path) -> None:
+    a = joint("a", "continuous", "l0", "l1", "", "0 0 1")
+    b = joint("b", "revolute", "l1", "l2", "", "0 1 0", limit() + mimic("a"))
+    arm = built(a, b, verify=False)
+    (tmp_path / "short.toml").write_text('like = "pinocchio"\njoints = ["a"]\n')
+    start, end = arm.convention(str(tmp_path / "short.toml")), arm.convention("pinocchio")
+    assert find_reordering("q", start, end) is None
+
+
+def test_the_error_of_a_mimic_value_has_the_unit_of_the_convention(tmp_path: Path) -> None:
+    arm = arm_with(rule_of_b=mimic("a", 2))
+    (tmp_path / "degrees.toml").write_text('angle = "deg"\n')
+    with pytest.raises(InputError, match="found a difference of 10, in the unit of this value"):
+        arm.convention(str(tmp_path / "degrees.toml")).from_([10.0, 30.0])
 
 
 def test_a_coordinate_of_only_one_model_is_an_error_that_names_the_joint() -> None:

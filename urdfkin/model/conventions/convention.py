@@ -1,7 +1,7 @@
 """Built-in conventions, and conventions from a user's TOML file.
 
 The target program can be any other program or library for robots. A user's file may start from a built-in
-convention and change some of its joints:
+convention, and change its settings and some of its joints:
 
     like = "urdf"                     # the default
     joints = ["shoulder", "elbow"]    # the order, optional
@@ -61,7 +61,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 class JointRule:
     """The conversion of a joint value to another program's value.
 
-    The other program's value is factor * (value in rad or m) + zero.
+    The other program's value is factor * (value in rad or m) + zero, where `factor` includes `sign`.
 
     Attributes:
         zero: The other program's value for the joint value 0.
@@ -273,9 +273,8 @@ def _quote(text: str) -> str:
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _BASE_62_DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
 #: An encoded number is a sequence of characters of `_BASE_62_DIGITS`.
-#: The value of a character is its index in `_BASE_62_DIGITS`, from 0 to 61.
-#: The last character of a number has a value below `_PUNYCODE_THRESHOLD`.
-#: For all other characters, the index in `_BASE_62_DIGITS` is at least `_PUNYCODE_THRESHOLD`.
+#: The last character has an index in `_BASE_62_DIGITS` below this number.
+#: All other characters have at least this index.
 _PUNYCODE_THRESHOLD = 31
 
 

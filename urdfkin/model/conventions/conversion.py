@@ -184,7 +184,7 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merge_fixed: bool
     ) -> list[int]:
-        """Sort the joints breadth first, and siblings by `keys`.
+        """Sort siblings by `keys`.
 
         If `merge_fixed` is true, links that a fixed joint connects count as one link.
         """
@@ -287,7 +287,7 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return (3,) in the link's frame, m."""
+        """Return the centre of mass (3,) in the link's frame, m; 0 without an inertial origin."""
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -392,6 +392,7 @@ class Conversion:
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
+            UnknownNameError: A coordinate, joint velocity or named pose is unknown.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -495,7 +496,7 @@ class Conversion:
                 raise InputError(
                     "the value of a mimic joint contradicts its mimic rule",
                     where=column.name,
-                    found=f"{difference:.3g} rad or m from the rule",
+                    found=f"a difference of {difference:.3g}, in the unit of this value in the convention",
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
                     question=QuestionsSection.MIMIC_JOINTS,
                 )
@@ -807,15 +808,8 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
         if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
             return None
         own, other = start._columns, end._columns
-        index = tuple(
-            next(
-                k
-                for k, c in enumerate(own)
-                if (c.index, c.cos_or_sin) == (x.index, x.cos_or_sin) and not c.is_mimic
-            )
-            for x in other
-        )
-        if any(
+        index = tuple(k for x in other if (k := _find_source(own, x)) is not None)
+        if len(index) < len(other) or any(
             x.cos_or_sin and (x.factor, x.zero) != (own[k].factor, own[k].zero)
             for k, x in zip(index, other, strict=True)
         ):
@@ -837,6 +831,19 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
     pairs = zip(end._rates, index, strict=True)
     factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
     return Reordering(index, factors, (0.0,) * len(index))
+
+
+def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int | None:
+    """Return the index of a number that determines `target`, or None.
+
+    A mimic joint is used only if no other number determines `target`.
+    """
+    candidates = (
+        k
+        for k, x in enumerate(numbers)
+        if (x.index, x.cos_or_sin) == (target.index, target.cos_or_sin) and x.factor
+    )
+    return min(candidates, key=lambda k: numbers[k].is_mimic, default=None)
 
 
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:

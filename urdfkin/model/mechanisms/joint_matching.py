@@ -340,7 +340,8 @@ def later_axes(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    The rotation about this axis is 0 if no other axis determines it. The same holds for the shift along it.
+    If no other axis determines the rotation about this axis, the rotation is 0. If no other axis determines
+    the shift along this axis, the shift is 0.
     """
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
@@ -361,7 +362,7 @@ def root_poses_by_siblings(
 ) -> Iterator[FloatArray]:
     """Yield poses of B's root that align up to three joint axes of one body.
 
-    If these axes do not determine the shift along the first axis, later axes determine it.
+    If these axes do not determine the shift along the first axis, later axes determine this shift.
     If no later axis determines this shift, the shift is 0.
     """
     edges = _with_axes(a, bodies[0])
@@ -606,10 +607,7 @@ class SubtreeMatcher:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _merge_ratios(self, some: VelocityRatios, others: VelocityRatios) -> VelocityRatios | None:
-        """Merge two sets of matched coordinates.
-
-        The result is None if a coordinate has two different partners or two different ratios.
-        """
+        """The result is None if a coordinate has two different partners or two different ratios."""
         for x in some.keys() & others.keys():
             (y, ratio), (other, other_ratio) = some[x], others[x]
             tolerance = self.tolerance.angle * max(1.0, abs(other_ratio))

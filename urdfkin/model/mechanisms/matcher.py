@@ -61,7 +61,7 @@ MAX_EXACT_SEARCH_DEPTH = 200
 #: If several choices at a joint are equally good, the joints after this joint decide.
 #: The matcher compares at most this number of joints on each branch.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root from axes that the search for an exact match tries.
+#: Maximum number of poses of B's root that the search for an exact match computes from axes and tries.
 #: The number applies to each pair of first bodies.
 MAX_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
@@ -79,7 +79,7 @@ Score = tuple[int, float]
 class LookAhead:
     """The largest number of comparisons for decisions between equally good choices.
 
-    Each comparison takes a joint of A and a joint of B, farther along than the chosen joints.
+    Each comparison takes one joint of A and one joint of B after the chosen joints.
 
     Several matchers can share a limit.
 
@@ -188,9 +188,9 @@ class MechanismMatcher:
                     yield base, X
 
     def _match_count_bound(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of matches from the bodies `base`.
+        """Two branches with m and n joints have at most min(m, n) joint pairs.
 
-        Two branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
+        The same bound holds for links.
         The sum of min(m, n) is largest if A's and B's branches are sorted by size.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
@@ -545,10 +545,7 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _zero_choice(self, joint: str) -> tuple[int, float | None]:
-        """Return a joint's sign and zero offset from `choices`.
-
-        If `choices` is None, the result is (0, None).
-        """
+        """Return a joint's sign and zero offset from `choices`; (0, None) without `choices`."""
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
@@ -732,7 +729,7 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
 #: Five prismatic joints have 120 orders.
 MAX_ORDERS = 120
 #: Maximum number of later joint pairs that a search compares; see `LookAhead`.
-#: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
+#: Without names and without an exact match, the robot TALOS needs up to 500 pairs, and Baxter up to 1,000.
 MAX_LOOK_AHEAD_PAIRS = 2000
 #: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
@@ -819,10 +816,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Search again with larger tolerances.
-
-    If all axes differ slightly, no axes agree within the normal tolerance.
-    """
+    """If all axes differ slightly, no axes agree within the normal tolerance."""
     if best.all_joints_agree and (best.a.free_frames or best.b.free_frames):
         return best
     a, b, (least, most), look_ahead = (
@@ -904,7 +898,6 @@ class _RulePair:
         return (self.constant_a + self.offset + 2.0 * math.pi * turn - self.constant_b) / self.slope_b
 
     def offset_from_beta(self, beta: float) -> float:
-        """Return o for a given beta."""
         return self.slope_b * beta + self.constant_b - self.constant_a
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:

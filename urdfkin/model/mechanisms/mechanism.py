@@ -3,7 +3,7 @@
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
 link's pose H describe the zero configuration, in one common frame. The poses of the links between the joints
 are not factors of this product. If links that are fixed to each other are merged or split, the product stays
-the same. Any body may be the root. From such a root, the path may lead from the child link of a joint to the
+the same. Any body may be the root. A path from this root may lead from the child link of a joint to the
 parent link. In this case, the joint's screw is reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
@@ -62,7 +62,8 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A unit vector counts as parallel to an axis if its perpendicular component is smaller than this.
+#: A vector counts as parallel to an axis if the length of its perpendicular component is smaller than this.
+#: The vector is a unit vector, or a distance vector in m.
 PARALLEL_TOLERANCE = 1e-12
 
 
@@ -313,7 +314,7 @@ class Mechanism:
     def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy of the mechanism with the joints `names` in this order.
 
-        `allows_order` must be true. Links whose pose depends on the order are omitted.
+        `allows_order` must be true. Links with a pose that depends on the order are omitted.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -374,14 +375,14 @@ class Mechanism:
                     yield [self.joint(edge).name, *others]
 
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
-        """Return whether two joints of the mechanism commute.
+        """The kinds of two joints decide whether the joints commute.
 
-        The kinds of the joints decide:
-
-            two prismatic joints:                always
-            two revolute joints:                 if their axes are the same line
-            a revolute and a prismatic joint:    if their axes are parallel
-            all other joints:                    never
+        | kinds | commute |
+        |---|---|
+        | two prismatic joints | always |
+        | two revolute joints | if their axes are the same line |
+        | a revolute and a prismatic joint | if their axes are parallel |
+        | all others | never |
         """
         kinds = [self.joint(edge).kind for edge in (one, other)]
         if not all(kind.has_axis and kind.nv for kind in kinds):
@@ -478,7 +479,7 @@ class MatchedJoints:
         previous: Index of the previous joint pair on the path from the base, or -1.
         sense: Sign, 1 or -1.
         offset: Zero offset, rad or m.
-        constant_motion: Rigid motion L (4, 4); B's joint moves the bodies after it by L exp(S' t').
+        constant_motion: Rigid motion L (4, 4); B's joint moves the bodies after the joint by L exp(S' t').
         axis_a: Screw S; exp(S t) moves the bodies after the joint.
             If A's joint is fixed, `axis_a` is the screw of B's joint.
         axis_b: B's screw S' in A's root frame. If S' = S, `axis_b` is the same object as `axis_a`.
@@ -635,10 +636,10 @@ class Alignment:
         )
 
     def exchangeable_pairs(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two joint pairs whose partners can be exchanged.
+        """Yield sets of two joint pairs that can exchange their partners.
 
         Both pairs have the same kind and the same previous pair.
-        Each of the two pairs differs, or a joint pair or link pair after it differs.
+        Each of the two pairs differs, or a later joint pair or link pair differs.
         In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
@@ -810,8 +811,8 @@ class _VariablesBuilder:
         """Express each coordinate of B by a variable."""
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
-        followers_last = sorted(own, key=self._is_mimic_in_a)
-        for i in followers_last:
+        mimic_joints_last = sorted(own, key=self._is_mimic_in_a)
+        for i in mimic_joints_last:
             name = tree.joints[i].name
             lines[name] = LinearFunction(f"b:{name}", 1.0, 0.0)
             step = self.step_of_b.get(i)
@@ -878,9 +879,8 @@ class _VariablesBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each variable.
+        """The range of a variable is the intersection of the limits of all joints that the variable moves.
 
-        The range is the intersection of the limits of all joints that the variable moves.
         If this intersection is empty or a single value, the range is given by A's limits.
         The limits of mimic joints are ignored: mimic joints follow their rules beyond these limits.
         """

@@ -226,11 +226,7 @@ def point_support(grid: Grid, p: FloatArray) -> Support:
 
 
 def _polygon_around_arc(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Enclose an arc of the unit circle in a polygon.
-
-    Returns:
-        Angle (rad) of each corner, and its distance from the circle's centre.
-    """
+    """Return the angle (rad) of each corner, and the distance of the corner from the circle's centre."""
     if high - low >= _FULL_TURN:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
@@ -361,8 +357,8 @@ def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after a joint's motion and L."""
-    # Planar and floating joints rotate without limits, so they allow every direction of d.
-    # Therefore, the new support function of d is h(u) = |u| max |d|.
+    # A planar or floating joint rotates d without limits, and a floating joint to every direction.
+    # Therefore, h(u) = |u| max |d| is an upper bound on the new support function of d.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -564,11 +560,7 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield upper bounds on the second derivatives of D with respect to two joints.
-
-    Yields:
-        Indices i and j <= i of the joints, and the bound.
-    """
+    """Yield the indices i and j <= i of two joints, and a bound on the second derivative of D."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
@@ -647,10 +639,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a copy of a joint pair without translations.
-
-    Translations do not change free vectors.
-    """
+    """Return a copy without translations, because translations do not change free vectors."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
