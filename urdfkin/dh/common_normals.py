@@ -303,8 +303,8 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # Let row k be the most tilted of rows i to end - 1. If row k is a Hayati row, d is chosen so that a of
-        # row k equals a of the reference.
+        # Let row k be the most tilted of rows i to end - 1. If row k is a Hayati row, d is chosen so that a
+        # of row k equals a of the reference.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:

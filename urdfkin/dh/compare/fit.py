@@ -45,8 +45,8 @@ _IS_ANGLE = np.array([motion.turns for motion in _CELL_MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: The fit of the cells ends if the norm of the 6 s errors (s samples) no longer decreases. The norm must also be
-#: at most 6 s * reach * this number.
+#: The fit of the cells ends if the norm of the 6 s errors (s samples) no longer decreases. The norm must
+#: also be at most 6 s * reach * this number.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
