@@ -10,7 +10,7 @@ _CP1252 = '<?xml version="1.0" encoding="cp1252"?>\n'
 
 
 def _called(name: str) -> str:
-    """Write the arm with an additional link."""
+    """Write the arm with an additional link of this name."""
     return arm(more=f'<link name="{name}"/>' + fixed("k", "tool", name))
 
 

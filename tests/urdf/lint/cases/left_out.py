@@ -2,7 +2,7 @@
 
 
 class Mjcf:
-    """An MJCF text and the code and message of all its findings."""
+    """An MJCF text with all findings, each as (code, message)."""
 
     def __init__(self, name: str, text: str, *findings: str) -> None:
         self.name, self.text = name, text
