@@ -312,7 +312,13 @@ class Comparator:
             return found
         back = align(b, a, _swap_pairs(alignment.names))
         other = JointComparison(back, (errors[1], errors[0]), base_as_written(b, a), self.tolerance)
-        return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
+        places = other.places_in_second_model()
+        return tuple(
+            replace(one, place=places.get(one.place, one.place))
+            if one.a is None
+            else replace(one, place=places.get(one.place, one.place), a=one.b, b=one.a)
+            for one in other.differences()
+        )
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
         """Align the unchanged models. Joints, joint orders and comparable links are those of `alignment`."""
@@ -761,6 +767,20 @@ class JointComparison:
             if step.a not in compared:
                 why = "no link after this joint has a matching link in the other model"
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
+
+    def places_in_second_model(self) -> dict[str, str]:
+        """Map each matched link and joint of the first model, for example "joint j", to its match.
+
+        A fixed joint is mapped to the joint before the link that matches its child link.
+        """
+        a, b = self.trees
+        places = {f"link {a.links[link]}": f"link {b.links[other]}" for link, other in self.pairs.items()}
+        for link, other in self.pairs.items():
+            if link and other:
+                places[f"joint {a.joints[link - 1].name}"] = f"joint {b.joints[other - 1].name}"
+        for step in self.alignment.steps:
+            places[f"joint {a.joints[step.a].name}"] = f"joint {b.joints[step.b].name}"
+        return places
 
     def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
         """Return P, the nearest ancestor that is a common link, and the joints from P to a link.
