@@ -63,7 +63,7 @@ TOLERANCE = 1e-9
 #: Results that are checked, but not counted in the robot's certificate.
 UNCOUNTED = ("table", "robot of a table")
 #: Time limit of the process of one mutant, seconds.
-_PATIENCE = 60
+_TIME_LIMIT = 60
 
 
 def _joint(name: str, kind: str, parent: str, child: str, more: str = "", axis: str = "1 -2 0.5") -> str:
@@ -194,7 +194,7 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
         except Exception as error:
             words.add(f"refused: {name}: {type(error).__name__}: {error}"[:200])
             continue
-        if right is not None and not _alike(found[name], right[name]):
+        if right is not None and not _is_close(found[name], right[name]):
             if robot.verifier.find_refusal() or not (robot.certificate().verified or name in UNCOUNTED):
                 words.add("caught")  # the result is returned as not verified
             else:
@@ -204,19 +204,19 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
     return ("caught" if "caught" in words else min(words, default="same")), found
 
 
-def _alike(x: FloatArray, y: FloatArray) -> bool:
+def _is_close(x: FloatArray, y: FloatArray) -> bool:
     return x.shape == y.shape and bool((np.abs(x - y) <= TOLERANCE * max(1.0, float(np.abs(y).max()))).all())
 
 
 # -- making a mutant ---------------------------------------------------------------------------------
 
 
-def _codes(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:
+def _code_objects(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield constant.co_qualname, constant
             if "<" not in constant.co_name:
-                yield from _codes(constant)
+                yield from _code_objects(constant)
 
 
 def _functions(module: types.ModuleType) -> Iterator[types.FunctionType]:
@@ -244,7 +244,7 @@ def _unwrapped(member: Any) -> Iterator[types.FunctionType]:
 
 def make(module: types.ModuleType, tree: ast.Module) -> bool:
     """Replace the code of a module's functions; return whether any function has changed."""
-    codes = dict(_codes(compile(tree, str(module.__file__), "exec")))
+    codes = dict(_code_objects(compile(tree, str(module.__file__), "exec")))
     changed = False
     for function in _functions(module):
         code = codes.get(function.__qualname__)
@@ -263,7 +263,7 @@ def attempt(name: str, change: Callable[[str], ast.Module], right: dict[str, Flo
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        signal.alarm(_PATIENCE)
+        signal.alarm(_TIME_LIMIT)
         os.close(reading)
         answer = "unreached"
         try:
