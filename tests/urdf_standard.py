@@ -53,7 +53,7 @@ def _pose(R: Any, p: Any) -> Any:
 
 
 def _quaternion(x: Any, y: Any, z: Any, w: Any) -> Any:
-    """Return the rotation v -> q v q* of a quaternion q of any length."""
+    """Return the rotation v -> q v q^-1 of a quaternion q of any length."""
     v, s = _vector((x, y, z)), x * x + y * y + z * z + w * w
     return ((2 * w * w - s) * _UNIT[:3, :3] + 2 * np.outer(v, v) + 2 * w * _skew(v)) / s
 

@@ -72,7 +72,7 @@ def disguised(table: DHTable, seed: int) -> DHTable:
 
 
 def published(name: str) -> tuple[FrameChain, DHTable]:
-    """Return the path of a robot and its published table."""
+    """Return the chain of a robot that a published table describes, and the table."""
     table = read_table(reference_path(name))
     return load(table.robot).chain(table.tip_frame, table.base_frame), table
 

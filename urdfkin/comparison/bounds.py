@@ -254,14 +254,9 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (frames, starting points, trials), m, of each frame k at the values `z[k]`.
+        """Return the distances (frames, starting points, trials), m, of frame k at the values `z[k]`.
 
-        Args:
-            z: (frames, starting points, trials, variables).
-            frames: The frames.
-
-        Returns:
-            (frames, starting points, trials) distances, m.
+        `z`: (frames, starting points, trials, variables)
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])

@@ -334,7 +334,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of the joint `name` alone; None if no frame moves, or if it cannot be computed."""
+    """Return the effect of the joint `name` alone; None if no frame moves or the effect is not computable."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

@@ -315,8 +315,8 @@ class Sameness(Displayable):
 
     Attributes:
         names: The robots' names.
-        sources: The sources of A and B, as the user gave them.
-        digests: SHA-256 of the two texts.
+        sources: For A and B: a path, a catalogue name, or a label such as `<text>`.
+        digests: For A and B: SHA-256 of the URDF text, or of the MJCF or USD file.
         verdict: `Verdict.SAME`, `SAME_AFTER` (after the changes in `after`), `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, one line each. The models may differ even after these
             changes.
