@@ -259,7 +259,7 @@ class Tool:
 
 
 #: Result of Pinocchio's check of the bounds.
-#: "not asked" means that the user requested no check.
+#: "not asked" means that the user requested no check, or that there is no bound to check.
 #: "not verified" means that Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _STATE_TEXTS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}

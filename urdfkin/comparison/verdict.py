@@ -861,12 +861,15 @@ class JointComparison:
     def _screws_and_pose(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the joint screws and the link pose in the frame of P, with error bounds (m, rad).
+        """Return the joint screws and the link pose in the frame of P.
 
         Args:
             which: 0 for A, 1 for B.
             back: Joints from C to P.
             path: Joints from C to the link.
+
+        Returns:
+            For each joint of `path`, the screw and error bounds (m, rad); the pose; the pose's error bounds.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)
