@@ -254,7 +254,7 @@ def _find_cause(
     """Return the cause of a difference, for example "origin rpy" or "axis", and a description.
 
     `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
-    pose is at q = 0.
+    pose is at the neutral configuration.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
