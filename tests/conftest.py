@@ -8,11 +8,12 @@ would compile the package again, which takes half of the time of such a test.
 
 Hypothesis tries the same examples in every run, so the result of a test depends only on the commit. The seed
 of a test is the hash of its source, and no run reads examples of earlier runs. By default, Hypothesis also
-draws constants from the imported modules, which depend on the tests of the run. This function is disabled.
-`pytest --hypothesis-profile=search` tries new examples, including these constants.
+draws constants from the imported modules. Constants are disabled, because the imported modules depend on the
+tests of the run. `pytest --hypothesis-profile=search` tries new examples, including constants.
 
-Collected tests exist until the end of the run, so the garbage collector ignores them. It is also disabled
-while pytest collects ten thousand tests, because it makes the collection a third longer.
+Collected tests exist until the end of the run, so the garbage collector ignores them. The garbage collector
+is also disabled while pytest collects tests. Otherwise, the collection of ten thousand tests takes a third
+longer.
 """
 
 import gc

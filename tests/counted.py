@@ -19,7 +19,10 @@ _NEW = count()
 class Counted:
     """A double with the largest first-order effect of each earlier rounding, in u = eps/2.
 
-    If `fused` is true, a product is rounded only in the next sum, as in `urdfkin.compiled.machine.numbers`.
+    Attributes:
+        errors: Effect of each rounding, by the number of the rounding.
+        fused: Whether a product is rounded only in the next sum, as in `urdfkin.compiled.machine.numbers`.
+        waits: Whether the number is a product that is not rounded yet.
     """
 
     value: float
@@ -70,7 +73,7 @@ class Counted:
     __radd__, __rmul__ = __add__, __mul__
 
     def of(self, value: float, slope: float) -> Counted:
-        """Return the rounded value of a function of the number."""
+        """Return the rounded value of a function with the derivative `slope` at the number."""
         x = self._number()
         return Counted(value, {k: slope * e for k, e in x.errors.items()}, self.fused).rounded()
 
@@ -101,7 +104,7 @@ def unit(x: Sequence[Counted]) -> list[Counted]:
 
 
 def rows_of(R: Matrix) -> list[FloatArray]:
-    """Return, for each row, the effects (roundings, 3) of each rounding on its numbers, in eps."""
+    """Return the effects (roundings, 3) of the roundings on the numbers of each row, in eps."""
     found = []
     for row in R:
         numbers = [x.rounded() if x.waits else x for x in row]
@@ -111,7 +114,10 @@ def rows_of(R: Matrix) -> list[FloatArray]:
 
 
 def all_conspiring(R: Matrix) -> float:
-    """Return the largest error (eps) of a component of a rotated unit vector, for the worst signs."""
+    """Return the largest error (eps) of a component of a rotated unit vector, for the worst signs.
+
+    For each row, the function alternates between the best direction and the worst signs from five directions.
+    """
     worst = 0.0
     for E in rows_of(R):
         for start in np.vstack((np.eye(3), [[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]])):

@@ -36,7 +36,7 @@ def point(t: Any) -> Any:
 
 
 def frame(i: int) -> MovingFrame:
-    """Return the motion of frame i + 1 in frame i at this time, with derivatives at 60 digits."""
+    """Return the motion of frame i + 1 in frame i at the time `T`, with derivatives at 60 digits."""
     R, d = ORIENTATIONS[i], ORIGINS[i]
     return MovingFrame(
         array(R(mp.mpf(T))), array(d(mp.mpf(T))), array(angular_velocity(R, T)), array(rate(d, T)),

@@ -16,7 +16,6 @@ def pose(generator: np.random.Generator) -> FloatArray:
 
 
 def odd_tree() -> KinematicTree:
-    """Return the tree."""
     generator = np.random.default_rng(7)
 
     def joint(name: str, kind: JointKind, mimic: Mimic | None = None) -> Joint:

@@ -4,8 +4,6 @@ The model is built joint by joint from the tree, without a URDF, so the tests do
 writer. Mimic joints are independent joints in the model, and coupled by G.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 import pinocchio as pin
 
@@ -69,7 +67,3 @@ class TreeOracle:
         return np.asarray(
             pin.getFrameClassicalAcceleration(self.model, self.data, self.frame(tip), reference).vector
         )
-
-
-def worst(a: FloatArray, b: FloatArray, axes: Sequence[int] | None = None) -> float:
-    return float(np.abs(a - b).max(initial=0.0))

@@ -22,14 +22,14 @@ class Ran(NamedTuple):
     printed: str
 
     def agrees(self) -> bool:
-        """Whether the outputs are equal except for blanks and signs of zeros; `...` matches any text."""
+        """Whether the outputs have equal words by `tidy`; `...` on the page matches any text."""
         words = [re.escape(word) for word in tidy(self.shown)]
         pattern = " ".join(words).replace(re.escape("..."), ".*")
         return re.fullmatch(pattern, " ".join(tidy(self.printed)), re.DOTALL) is not None
 
 
 def tidy(text: str) -> list[str]:
-    """Return the words, without the signs of zeros, which depend on rounding."""
+    """Return the words without square brackets, and without the signs of zeros, which depend on rounding."""
     return re.sub(r"-0\.(?![0-9])", " 0.", re.sub(r"[\[\]]", " ", text)).split()
 
 

@@ -51,7 +51,10 @@ def shift(x: float, y: float, z: float) -> FloatArray:
 
 @st.composite
 def step(draw: st.DrawFn, tame: bool = False) -> FloatArray:
-    """Return the pose from one joint's frame to the next joint's frame; with `tame`, without tiny numbers."""
+    """Return the pose of a joint's frame in the previous joint's frame; both frames have z as joint axis.
+
+    With `tame`, lengths and tilts are not tiny.
+    """
     length = tame_length if tame else any_length
     relation = draw(st.sampled_from(RELATIONS[:TAME] if tame else RELATIONS))
     a, tilt = draw(length), 0.0
@@ -76,7 +79,7 @@ def step(draw: st.DrawFn, tame: bool = False) -> FloatArray:
 
 @st.composite
 def local_frame(draw: st.DrawFn) -> FloatArray:
-    """Return the rotation (4, 4) of a joint frame relative to its axis; for the identity, the axis is z."""
+    """Return the rotation (4, 4) of a URDF joint frame in a frame with z as joint axis."""
     if draw(st.booleans()):
         return np.eye(4)
     return rotation("x", draw(angle)) @ rotation("y", draw(angle)) @ rotation("z", draw(angle))

@@ -53,7 +53,7 @@ def _pose(R: Any, p: Any) -> Any:
 
 
 def _quaternion(x: Any, y: Any, z: Any, w: Any) -> Any:
-    """Return the rotation v -> q v q* of a quaternion q of any length."""
+    """Return the rotation v -> q v q^-1 of a quaternion q of any length."""
     v, s = _vector((x, y, z)), x * x + y * y + z * z + w * w
     return ((2 * w * w - s) * _UNIT[:3, :3] + 2 * np.outer(v, v) + 2 * w * _skew(v)) / s
 
@@ -252,8 +252,8 @@ class Robot:
             back = R.T if reference == "local" else _UNIT[:3, :3]
             velocity = p_1 - _skew(w) @ p if at_origin else p_1
             classical = p_2 - (_skew(alpha) + _skew(w) @ _skew(w)) @ p if at_origin else p_2
-            # The linear part is the time derivative of the linear velocity's components R^T p' or, in WORLD,
-            # of the components in the world's axes.
+            # `local` and `local_world_aligned`: R times the time derivative of R^T p'
+            # `world`: time derivative of the linear velocity p' - w x p
             spatial = R @ (R_1.T @ p_1 + R.T @ p_2)
             if at_origin:
                 spatial = p_2 - _skew(alpha) @ p - _skew(w) @ p_1

@@ -31,7 +31,7 @@ def joint(
 
 
 def robot(*joints: str, name: str = "r", attributes: str = "") -> str:
-    """Write a robot with joints, and with the links of these joints."""
+    """Write a robot with joints, and with the parent and child links of these joints."""
     links = dict.fromkeys(re.findall(r"<(?:parent|child) (link=(?:\"[^\"]*\"|'[^']*'))/>", "".join(joints)))
     named = "".join(f"<{link.replace('=', ' name=', 1)}/>" for link in links)
     return f"<robot name={quoteattr(name)} {attributes}>{named}{''.join(joints)}</robot>"

@@ -54,7 +54,7 @@ IN_XML = {
 
 
 def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAMES["line"]) -> str:
-    """Write a chain whose links and joints have these names."""
+    """Write a chain whose links have these names; each joint has its child link's name and a blank."""
     joints = (
         urdfs.joint(f"{child} ", "continuous", parent, child, 'xyz="0.1 0 0"', f"0 {k % 2} {1 - k % 2}")
         for k, (parent, child) in enumerate(pairwise(["base", *names]))
@@ -63,7 +63,7 @@ def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAM
 
 
 def urdf(name: str) -> str:
-    """Write an arm whose robot, links and joints have a name, followed by a number if they must differ."""
+    """Write an arm whose robot and root link have this name; other names are this name and a number."""
     return urdfs.robot(
         urdfs.joint(f"{name} 1", "revolute", name, f"{name}1", 'xyz="0 0 0.4"', more=urdfs.limit()),
         urdfs.joint(f"{name} 2", "revolute", f"{name}1", f"{name}2", 'xyz="0.3 0 0"', "0 1 0", urdfs.limit()),

@@ -2,15 +2,16 @@
 
     python -m tests.attacks.input_to_result_mutants [--sample N --seed S] [MODULE...]
 
-Each mutant is one of `scripts.mutating.operators`. It changes an imported function in a new process. The
-process then loads a robot with all kinds of joints, chains of mimic joints and unusual names, and computes
-every quantity in many ways. The program prints the outcomes as JSON:
+Each mutant is a change by `scripts.mutating.operators` of an imported function in a new process. The process
+then loads a robot with all kinds of joints, chains of mimic joints and unusual names. It computes every
+quantity in many ways. The program prints the outcomes as JSON:
 
-    caught    a call raised VerificationError or OracleError, or Pinocchio reads another robot
-    refused   a call raised another error
-    same      every result is right
-    WRONG     a result is wrong, and the certificate states that it was verified
-    BLIND     urdfkin misreads a robot by a billionth, and a result is verified all the same
+    caught      a call raised VerificationError, OracleError or TableError, or a wrong result is not verified
+    refused     a call raised another error, or the process ended without an answer
+    same        every result is right
+    WRONG       a result is wrong, and the certificate states that it was verified
+    BLIND       urdfkin reads numbers of a robot with an error of 1e-9, and a result is verified all the same
+    unreached   the change cannot be applied to the imported function
 """
 
 import argparse
@@ -61,8 +62,8 @@ MODULES = (
 TOLERANCE = 1e-9
 #: Results that are checked, but not counted in the robot's certificate.
 UNCOUNTED = ("table", "robot of a table")
-#: Time limit of a process, seconds.
-_PATIENCE = 60
+#: Time limit of the process of one mutant, seconds.
+_TIME_LIMIT = 60
 
 
 def _joint(name: str, kind: str, parent: str, child: str, more: str = "", axis: str = "1 -2 0.5") -> str:
@@ -150,7 +151,7 @@ def _of_table(q: FloatArray) -> FloatArray:
 
 
 def misread() -> Robot:
-    """Return the robot with numbers that are wrong by a billionth for urdfkin, but not for Pinocchio."""
+    """Return the robot with a relative error of 1e-9 in all numbers of urdfkin, but not of Pinocchio."""
     tree = tree_of(
         re.sub(r'(?<=[" ])-?[0-9.]+(?=[" ])', lambda x: repr(float(x[0]) * (1 + 1e-9)), URDF).encode()
     )
@@ -193,7 +194,7 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
         except Exception as error:
             words.add(f"refused: {name}: {type(error).__name__}: {error}"[:200])
             continue
-        if right is not None and not _alike(found[name], right[name]):
+        if right is not None and not _is_close(found[name], right[name]):
             if robot.verifier.find_refusal() or not (robot.certificate().verified or name in UNCOUNTED):
                 words.add("caught")  # the result is returned as not verified
             else:
@@ -203,23 +204,23 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
     return ("caught" if "caught" in words else min(words, default="same")), found
 
 
-def _alike(x: FloatArray, y: FloatArray) -> bool:
+def _is_close(x: FloatArray, y: FloatArray) -> bool:
     return x.shape == y.shape and bool((np.abs(x - y) <= TOLERANCE * max(1.0, float(np.abs(y).max()))).all())
 
 
 # -- making a mutant ---------------------------------------------------------------------------------
 
 
-def _codes(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:
+def _code_objects(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield constant.co_qualname, constant
             if "<" not in constant.co_name:
-                yield from _codes(constant)
+                yield from _code_objects(constant)
 
 
 def _functions(module: types.ModuleType) -> Iterator[types.FunctionType]:
-    """Yield the functions and methods that a module defines, also wrapped ones."""
+    """Yield the functions and methods that a module defines, including wrapped functions."""
     for value in list(vars(module).values()):
         members = list(vars(value).values()) if inspect.isclass(value) else [value]
         for member in members:
@@ -243,7 +244,7 @@ def _unwrapped(member: Any) -> Iterator[types.FunctionType]:
 
 def make(module: types.ModuleType, tree: ast.Module) -> bool:
     """Replace the code of a module's functions; return whether any function has changed."""
-    codes = dict(_codes(compile(tree, str(module.__file__), "exec")))
+    codes = dict(_code_objects(compile(tree, str(module.__file__), "exec")))
     changed = False
     for function in _functions(module):
         code = codes.get(function.__qualname__)
@@ -256,13 +257,13 @@ def make(module: types.ModuleType, tree: ast.Module) -> bool:
 
 
 def attempt(name: str, change: Callable[[str], ast.Module], right: dict[str, FloatArray]) -> str:
-    """Return the outcome of a changed module in a new process; `unreached` if the change is not possible."""
+    """Return the outcome of a changed module in a new process."""
     module = importlib.import_module(f"urdfkin.{name}")
     tree = change(source_of(name))
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        signal.alarm(_PATIENCE)
+        signal.alarm(_TIME_LIMIT)
         os.close(reading)
         answer = "unreached"
         try:
@@ -294,13 +295,12 @@ def truth() -> dict[str, FloatArray]:
 
 
 def mutants_of(names: Sequence[str], sample: int | None, seed: int) -> list[tuple[str, int]]:
-    """Return mutants as (module, number): all mutants of some modules, or a sample."""
+    """Return mutants as (module, number): all mutants of the modules, or `sample` random mutants."""
     places = [(name, i) for name in names for i in range(len(list_changes(ast.parse(source_of(name)))))]
     return places if sample is None else random.Random(seed).sample(places, min(sample, len(places)))
 
 
 def main() -> None:
-    """Print the outcome of each mutant, or of a sample."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("modules", nargs="*")
     arguments.add_argument("--sample", type=int)

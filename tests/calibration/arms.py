@@ -12,7 +12,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 
-#: Revolute, prismatic and continuous joints, about and along axes of every kind, on two branches.
+#: Revolute, prismatic and continuous joints with oblique axes and coordinate axes, on two branches.
 BRANCHED = """<?xml version="1.0"?>
 <!-- measured on the bench; do not touch -->
 <robot name="branched">
@@ -59,7 +59,7 @@ class Bench:
         return self.model.chain.poses(self.values(q), self.truth)
 
     def noisy(self, metres: float, radians: float, seed: int) -> FloatArray:
-        """Return the poses (s, 4, 4) that an instrument with this noise measures."""
+        """Return the poses (s, 4, 4) that an instrument measures with noise of these standard deviations."""
         rng = np.random.default_rng(seed)
         T, s = self.T.copy(), len(self.T)
         T[:, :3, 3] += metres * rng.standard_normal((s, 3))
@@ -85,7 +85,10 @@ def bench(
     error: float = 2e-3,
     seed: int = 0,
 ) -> Bench:
-    """Return a robot whose parameters have errors of about `error` (m, rad), except base and tool."""
+    """Return a robot whose parameters have random errors with the standard deviation `error` (m, rad).
+
+    The parameters of base and tool have no errors.
+    """
     robot = load(name, verify=False)
     model = make_urdf_model(robot.tree, tip, base, fit)
     rng = np.random.default_rng(seed)

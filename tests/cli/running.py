@@ -33,7 +33,7 @@ class Done:
 
     @property
     def data(self) -> Any:
-        """Standard output as JSON, without NaN and Infinity."""
+        """Standard output as JSON; ValueError for NaN and Infinity."""
         return json.loads(self.text, parse_constant=_reject)
 
     @property
@@ -101,9 +101,10 @@ def python(code: str, *words: str, check: bool = True, **how: Any) -> subprocess
 
 
 def imported(lines: Sequence[str], modules: Collection[str]) -> dict[str, list[str]]:
-    """Run commands one after the other in one new process; return those after which modules are imported.
+    """Run commands one after the other in one new process.
 
-    A module that a command imports stays imported, so the commands after it are returned too.
+    Return each command after which some of `modules` are imported, with their names. The modules stay
+    imported, so the later commands are returned too. A command that fails is returned with its exit code.
     """
     code = (
         "import json, shlex\nfrom urdfkin.cli import main\nfound = {}\n"

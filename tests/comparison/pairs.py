@@ -96,7 +96,7 @@ def split(tree: KinematicTree) -> KinematicTree:
 
 
 def merged(tree: KinematicTree) -> KinematicTree:
-    """Remove the fixed links; the joints after a fixed link follow the link to which it was fixed."""
+    """Remove links that are attached by fixed joints; their child joints move to the parent link."""
     carrier: list[tuple[str, FloatArray]] = [(tree.links[0], np.eye(4))]
     rows: list[Branch] = []
     for i, joint in enumerate(tree.joints):
@@ -214,7 +214,7 @@ def counted_elsewhere(tree: KinematicTree) -> KinematicTree:
 
 
 def exchanged(tree: KinematicTree) -> KinematicTree:
-    """Exchange the first two neighbouring joints that commute, of which at least one is prismatic."""
+    """Exchange the first two neighbouring joints that commute; at least one of them is prismatic."""
     for j, outer in enumerate(tree.joints):
         i = outer.parent - 1
         if i < 0 or sum(joint.parent == outer.parent for joint in tree.joints) > 1:
@@ -235,13 +235,13 @@ def exchanged(tree: KinematicTree) -> KinematicTree:
 
 
 def moving(tree: KinematicTree) -> list[int]:
-    """Return the joints with an axis on the path with the most coordinates."""
+    """Return the indices of the independent joints with an axis, on the path with the most velocities."""
     deepest = max(tree.leaves(), key=lambda link: sum(tree.joints[i].nv for i in tree.path(link)))
     return [i for i in tree.path(deepest) if tree.joints[i].kind.has_axis and tree.joints[i].nv]
 
 
 def middle(tree: KinematicTree) -> tuple[int, Joint]:
-    """Return the joint in the middle of the longest chain, with its index."""
+    """Return the index of the middle joint of `moving`, and the joint."""
     chain = moving(tree)
     at = chain[len(chain) // 2]
     return at, tree.joints[at]
@@ -360,7 +360,7 @@ def robot(name: str) -> Robot:
 
 
 def changed(name: str, what: str) -> Robot | None:
-    """Return the robot after a change, or None if the change changes nothing."""
+    """Return the robot after a change, or None if the change does not apply to the robot."""
     change = (ALIKE | UNLIKE)[what]
     if what in UNLIKE and not moving(robot(name).tree):
         return None

@@ -45,7 +45,10 @@ def within(robot: Robot, q: FloatArray) -> NDArray[np.bool_]:
 
 
 def searched(a: Robot, b: Robot, at_b: Callable[[FloatArray], FloatArray], interval: Interval) -> float:
-    """Return the largest distance (m) that a global search finds, computed at fifty digits."""
+    """Return the largest distance (m) of a frame that a global search within the limits finds.
+
+    `at_b` converts configurations of A to B. The distance is computed at fifty digits.
+    """
     path = a.tree.path(a.tree.link_index(interval.frame))
     along = (a.tree.joints[i] for i in path)
     independent_joints = {

@@ -29,7 +29,10 @@ def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> K
 
 
 def elbow(kinds: str = "RRRRRR") -> KinematicTree:
-    """Return six joints with parallel, skew and intersecting axes; all inner cells have different effects."""
+    """Return an arm of up to six joints with parallel, skew and intersecting axes.
+
+    All inner cells of the arm's table have different effects.
+    """
     square = rotation("x", math.pi / 2)
     steps = [
         shift(0, 0, 0.3), shift(0.05, 0.02, 0.1) @ square, shift(0.4, 0, 0.1),
@@ -49,8 +52,8 @@ def with_cells(table: DHTable, row: int, **cells: Any) -> DHTable:
 def disguised(table: DHTable, seed: int) -> DHTable:
     """Return a table of the same mechanism with reversed x and z axes, other zeros, and no base and tool.
 
-    Rz(pi) before a step and after it negates a, alpha and beta; reversing z_i-1 by Rx(pi) negates d and theta
-    and moves alpha by pi on both sides, and beta, which stands between, changes its sign.
+    Rz(pi) before and after a step negates a, alpha and beta. Rx(pi) reverses z_i-1 and negates d and theta.
+    Rx(pi) also adds pi to alpha of the rows before and after z_i-1, and negates beta of the row before it.
     """
     rng = np.random.default_rng(seed)
     flip_x, flip_z = rng.integers(0, 2, (2, len(table.rows) + 1)).astype(bool)
@@ -69,7 +72,7 @@ def disguised(table: DHTable, seed: int) -> DHTable:
 
 
 def published(name: str) -> tuple[FrameChain, DHTable]:
-    """Return the path of a robot and its published table."""
+    """Return the chain of a robot that a published table describes, and the table."""
     table = read_table(reference_path(name))
     return load(table.robot).chain(table.tip_frame, table.base_frame), table
 
@@ -77,7 +80,7 @@ def published(name: str) -> tuple[FrameChain, DHTable]:
 def error_ratio(
     table: DHTable, poses: FloatArray, expected: FloatArray, q: FloatArray, slack: FloatArray | float = 0.0
 ) -> float:
-    """Return the largest tip error divided by the sum of the table's tolerance and `slack` (m)."""
+    """Return the largest tip error divided by the table's tolerance; `slack` (m) is added for distances."""
     metres, radians = table.tolerance(q)
     error = np.abs(poses - expected)
     lengths = np.linalg.norm(error[..., :3, 3], axis=-1) / np.maximum(metres + slack, 1e-300)

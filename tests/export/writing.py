@@ -19,7 +19,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 
 ALL = tuple(row.method for row in exportable_quantities())
-#: Program that compiles or runs a file in a language
+#: Program that compiles or runs a file, by language.
 PROGRAMS = {"c": "cc", "cpp": "c++", "cuda": "c++", "matlab": "octave-cli"}
 LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy", "sympy-exact")
 
@@ -45,13 +45,13 @@ def file(written: FrameCode, to: str, folder: Path) -> Path:
 def module(
     robot: Robot | str, to: str, folder: Path, *quantities: str, frame: str | None = None
 ) -> ModuleType:
-    """Import an exported file of a Python library."""
+    """Export the equations of a frame for a Python library, and import the file."""
     robot = urdfkin.load(robot) if isinstance(robot, str) else robot
     return module_of(file(code(robot, frame, quantities or ALL), to, folder))
 
 
 def need(to: str) -> None:
-    """Skip the test if a file in a language cannot run here."""
+    """Skip the test if the program or the library for a language is not installed."""
     if (program := PROGRAMS.get(to)) and shutil.which(program) is None:
         pytest.skip(f"no {program}")
     if to in LIBRARIES and importlib.util.find_spec(to.partition("-")[0]) is None:

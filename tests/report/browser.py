@@ -111,7 +111,6 @@ class Browser:
         WebDriverWait(self.chrome, 60).until(lambda _: self.js(code))
 
     def wait_for(self, words: str) -> None:
-        """Wait until the page contains the words."""
         WebDriverWait(self.chrome, 60).until(lambda _: words in self.js("return document.body.innerText"))
 
     def screenshot(self, name: str) -> None:

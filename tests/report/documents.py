@@ -49,7 +49,7 @@ def hostile() -> Document:
 
 
 def failing() -> Document:
-    """Return a report in which the Panda's local velocity disagrees infinitely, and a file is no URDF."""
+    """Return a report with three infinite errors of the Panda's local velocity, and with a wrong file."""
     document = arms()
     panda, ur5 = document["robots"]
     check = next(c for c in panda["checks"] if c["quantity"] == "velocity" and c["reference"] == "local")

@@ -46,7 +46,10 @@ def assert_agrees(
     *,
     is_odd: bool = False,
 ) -> None:
-    """Compare the results for a link with Pinocchio's default model; an odd robot may have large lengths."""
+    """Compare the results for a link with Pinocchio's model without mimic joints.
+
+    The tolerance is larger for an odd robot, which may have large lengths.
+    """
     model = model_of(robot)
     data, G, full = model.createData(), coupling(robot, model), robot.to_pinocchio(q)
     index = model.getFrameId(link.removeprefix("link:"), pin.FrameType.BODY)

@@ -1,6 +1,6 @@
 """URDF texts of unusual robots, with joints of every kind at unusual places.
 
-Numbers have six digits, like those of CAD exporters, so right angles are only approximate.
+Numbers of origins and axes have six digits, as from CAD exporters, so right angles are only approximate.
 """
 
 from collections.abc import Callable, Sequence
@@ -89,7 +89,7 @@ def _chain(name: str, seed: int, kinds: Sequence[str]) -> str:
 
 
 def _hand(name: str, seed: int, *, sliding: bool = False) -> str:
-    """Return five fingers of eight joints, 30 of which mimic one of the other 10 by a random rule."""
+    """Return five fingers of eight joints; 30 of the 40 joints mimic one of the other 10 by a random rule."""
     urdf, rng = Urdf(name, seed), np.random.default_rng(seed)
     for finger in range(5):
         parent, independent_joints = 0, list[str]()
@@ -152,7 +152,7 @@ def _default_everything() -> str:
     return urdf.text
 
 
-def _followers_of_followers() -> str:
+def _mimics_of_mimics() -> str:
     urdf = Urdf("relay", 14)
     first = urdf.add("revolute", joint="z_leader")
     second = urdf.add("revolute", joint="a_follower", mimic=(first, -0.5, 0.1))
@@ -193,7 +193,7 @@ _TEXTS: dict[str, Callable[[], str]] = {
     "odd_names": _names,
     "same_names": _same_names,
     "default_everything": _default_everything,
-    "followers_of_followers": _followers_of_followers,
+    "followers_of_followers": _mimics_of_mimics,
     "sizes": _sizes,
     **{f"tree_{seed}": partial(random_tree, seed) for seed in range(12)},
 }

@@ -31,7 +31,10 @@ def robot(name: str) -> Robot:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table such as that of figure 7.15; the joint's coordinate is added to theta or d."""
+    """A row of a table as in figure 7.15.
+
+    The joint's coordinate is theta of a revolute joint, and is added to d of a prismatic joint (theta = 0).
+    """
 
     d: Any
     a: Any
@@ -101,31 +104,31 @@ class Motion:
         return array(self.R(i - 1)(mp.mpf(0)))[:, 2]
 
     def x(self, i: int) -> FloatArray:
-        """x_i."""
+        """Return x_i."""
         return array(self.R(i)(mp.mpf(0)))[:, 0]
 
     def rotation(self, i: int) -> FloatArray:
-        """R_0_i."""
+        """Return R_0_i."""
         return array(self.R(i)(mp.mpf(0)))
 
     def origin(self, i: int) -> FloatArray:
-        """d_0i."""
+        """Return d_0i."""
         return array(self.d(i)(mp.mpf(0)))
 
     def w(self, i: int) -> FloatArray:
-        """w_0i."""
+        """Return w_0i."""
         return array(angular_velocity(self.R(i), 0.0))
 
     def alpha(self, i: int) -> FloatArray:
-        """w-dot_0i."""
+        """Return w-dot_0i."""
         return array(angular_acceleration(self.R(i), 0.0))
 
     def vel(self, i: int) -> FloatArray:
-        """d-dot_0i."""
+        """Return d-dot_0i."""
         return array(rate(self.d(i), 0.0))
 
     def acc(self, i: int) -> FloatArray:
-        """d-dot-dot_0i."""
+        """Return d-dot-dot_0i."""
         return array(second_rate(self.d(i), 0.0))
 
     def between_rate(self, i: int) -> FloatArray:

@@ -8,7 +8,7 @@ import pytest
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
-    """Write a text into a file with this name, in a folder of the test; return the path of the file."""
+    """Return a function that writes a text into a file in the test's folder, and returns the path."""
 
     def of(text: str, name: str = "robot.usda") -> Path:
         path = tmp_path / name

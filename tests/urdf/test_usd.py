@@ -1527,3 +1527,32 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
     assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM_ROUNDINGS
     assert 1.0 < worst["Orient"] <= 4.0
     assert 0.5 < worst["Transform"] <= math.sqrt(1.5)
+
+
+def test_a_difference_that_only_the_second_order_of_the_models_shows_has_the_names_of_a(read: Read) -> None:
+    """`camera.0` is attached to `base` in the URDF, and to `x` in the stage.
+
+    In the stage, the position of the camera relative to `x` does not contain the rounding errors of `x`.
+    """
+    rpy, offset = (0.3, 0.4, 0.5), np.array([0.5, 0.5, 0.5])
+    camera = np.array([0.1, 0.2, 0.3]) + rotation_from_rpy(rpy) @ offset
+    xyz, turned = " ".join(map(repr, camera.tolist())), 'rpy="0.3 0.4 0.5"'
+    urdf = urdfs.robot(
+        urdfs.joint("before_x", "fixed", "base", "x", f'xyz="0.1 0.2 0.3" {turned}'),
+        urdfs.joint("before_camera", "fixed", "base", "camera.0", f'xyz="{xyz}" {turned}'),
+        urdfs.joint("turn", "continuous", "base", "tip", 'xyz="0 0 0.5"'),
+    )
+    *vector, w = quaternion_of(rotation_from_rpy(rpy)).tolist()
+    in_the_stage = encode_usd_name("camera.0")
+    joints = (
+        turn("turn", "base", "tip", (0, 0, 0.5))
+        + joint("before_x", "Fixed", "base", "x", localPos0=(0.1, 0.2, 0.3), localRot0=(w, *vector))
+        + joint("before_m", "Fixed", "x", "m", localPos0=(0.5 + 2.0**-24, 0.5, 0.5))
+        + joint("before_camera", "Fixed", "m", in_the_stage)
+    )
+    links = "".join(map(body, ("x", "m", in_the_stage, "tip")))
+    robots = loaded(urdf), read(BASE + links + joints)
+    for found, name in zip(in_both_orders(*robots), ("camera.0", in_the_stage), strict=True):
+        assert [(one.place, one.what) for one in found.unexplained] == [(f"link {name}", "origin")]
+    for old, new, name in ((*robots, "camera.0"), (*robots[::-1], in_the_stage)):
+        assert f"link {name}" in [change.element for change in urdfkin.diff(old, new).changes]

@@ -5,16 +5,16 @@ coordinate at a time. The largest distance found is a lower bound of the true la
 
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
 between the models. Each term is the largest effect of one difference over all configurations. If the models
-differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound: it
-divides the space of all variables into boxes, and bounds the distance in each box.
+differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. For
+this, `tighten` divides the ranges of the variables into boxes, and bounds the distance in each box.
 
     D(q) = p_B - p_A              difference of the frame's positions in B and A
     D_i                           derivative of D with respect to variable i
     c                             middle of the box
     c_i - h_i to c_i + h_i        range of variable i in the box
     c_i + x_i,  |x_i| <= h_i      value of variable i at a configuration q in the box
-    M_ij                          bound on the second derivative of D with respect to variables i and j,
-                                  for every configuration (`curvature_bounds`)
+    M_ij                          bound on the length of the second derivative of D with respect to variables
+                                  i and j, for every configuration (`curvature_bounds`)
 
     |D(q)| <= max over |x_i| <= h_i of |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
 
@@ -44,13 +44,12 @@ from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
-#: Number of random configurations that the search tries first.
+#: Number of configurations that are sampled uniformly within the joint ranges.
 RANDOM_SAMPLES = 512
 #: Number of random configurations at corners of the joint ranges.
 #: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
 #: Number of sampled configurations from which the search starts for each frame.
-#: The search looks for the largest distance.
 STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
 TRIALS_PER_STEP = 13
@@ -136,7 +135,9 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Check whether two configurations correspond and are within the joint ranges.
+        """Check whether two configurations correspond.
+
+        Each variable must be within its search range `ends`. A's planar and floating joints must be neutral.
 
         Args:
             q_a: (1, nq) configuration of A.
@@ -166,7 +167,7 @@ class DistanceSearch:
         """Return poses in A's root frame.
 
         Returns:
-            Poses of A's frames, and of B's frames without their tools, each (n, frames, 4, 4).
+            Poses of A's frames, and of B's frames without `FramePair.tool`, each (n, frames, 4, 4).
         """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -193,15 +194,11 @@ class DistanceSearch:
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the frame distances.
-
-        Returns:
-            (n, frames) distances, m.
-        """
+        """Return the frame distances (n, frames), m."""
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sample_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances at sampled values.
+        """Return distances at the values nearest to zero, at corners, and at random values.
 
         Returns:
             (n, frames) distances, m, and (n, variables) values of the variables.
@@ -227,7 +224,10 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize distances by coordinate search from z (frames, starting points, variables)."""
+        """Search for the largest distances by varying one coordinate at a time.
+
+        The search starts at `z` (frames, starting points, variables).
+        """
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
@@ -254,9 +254,9 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (frames, starting points, trials), m, of each frame k at the values `z[k]`.
+        """Return the distances (frames, starting points, trials), m, of frame k at the values `z[k]`.
 
-        z has the shape (frames, starting points, trials, variables).
+        `z`: (frames, starting points, trials, variables)
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -296,12 +296,13 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 #: Maximum number of boxes in memory.
 #: With this number of boxes, `tighten` takes one or two seconds per frame.
 MAX_BOXES = 2**17
-#: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
+#: Number of boxes in one batch. The Jacobians take 48 bytes for each box and coordinate.
+#: Without batches, the 2^22 boxes of `recheck` would therefore take gigabytes.
 BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Compute the first-order part of the upper bound on a frame's distance, for each box.
+    """Bound the linear part |D + sum_i D_i x_i| of a frame's distance in each box.
 
     Args:
         names: Every variable that changes the distance.
@@ -318,7 +319,7 @@ class BoxBounds:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: For each robot, derivatives (nv, variables) of its joint values with respect to the variables.
+        #: For each robot, derivatives (nv, variables) of the coordinates with respect to the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
@@ -347,14 +348,7 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D and its derivatives D_i.
-
-        Args:
-            c: (n, variables) box centers.
-
-        Returns:
-            D (n, 3), and D_i (n, 3, variables).
-        """
+        """Return D (n, 3) and the derivatives D_i (n, 3, variables) at box centers `c` (n, variables)."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -366,10 +360,7 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
-
-        `point` (3,) contains the point's coordinates in `frame`, m.
-        """
+        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a `point` (3,) given in `frame`."""
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not point.any():
@@ -384,8 +375,8 @@ def tighten(
     """Try to prove a smaller upper bound on a frame's distance.
 
     Args:
-        search: Search for distances.
-        frame: Matching frames.
+        search: Search between the same two models.
+        frame: The frame.
         target: Bound at which the proof ends, m.
         upper: A proven bound, m.
         max_boxes: Maximum number of boxes in memory.

@@ -74,7 +74,9 @@ Value = str | float | list[str | float | None] | CertifiedRule | None
 class DifferenceEntry(TypedDict):
     """A difference between the two models."""
 
-    place: Annotated[str, doc("Name of the joint or link of A that differs.")]
+    place: Annotated[
+        str, doc("The joint or link that differs, for example `joint elbow`; of A, unless only B has it.")
+    ]
     what: Annotated[
         str, doc("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
     ]
@@ -192,7 +194,13 @@ class SameCertificate(Header):
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
         doc("Kinds of changes that bring B closest to A."),
     ]
-    differences: Annotated[list[DifferenceEntry], doc("Differences, in order from the base to the tips.")]
+    differences: Annotated[
+        list[DifferenceEntry],
+        doc(
+            "Differences, in order from the base to the tips. Differences without matched joints or links"
+            " come last."
+        ),
+    ]
     remarks: Annotated[
         list[DifferenceEntry],
         doc("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
@@ -222,7 +230,7 @@ class SameCertificate(Header):
         FrameEntry | None,
         doc(
             "The frame with the largest distance between the unchanged models, and an interval of this"
-            " distance; null if B needs no changes."
+            " distance; null if B needs no changes, or if no frames can be compared."
         ),
     ]
     checked: Confirmed
@@ -272,11 +280,11 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    The check matches the joints as in the certificate. For the verdict "differs", `recheck` also matches the
-    joints as `same` does without a map: the verdict must be the same.
+    `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` also matches the
+    joints as `same` does without `map`. The verdict of this second comparison must also be "differs".
 
     Returns:
-        A line for each wrong statement.
+        A line for each statement that is wrong or not proven.
 
     Raises:
         InputError: the certificate was made for other models, or names an unknown joint or link.
@@ -483,10 +491,7 @@ def _interval_errors(
     *,
     use_branch_and_bound: bool,
 ) -> Iterator[str]:
-    """Yield an error for each wrong or unproven bound.
-
-    `rounding` contains a distance (m) and an angle (rad).
-    """
+    """Yield an error for each wrong or unproven bound; `rounding` is (m, rad)."""
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)

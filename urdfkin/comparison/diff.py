@@ -1,7 +1,8 @@
 """List the changes between two versions of a robot description, and bound the displacements of frames.
 
-Two files of the same format are compared attribute by attribute. Files of different formats have different
-attributes; `diff` then lists the differences that `same` finds.
+Two files of the same format are compared attribute by attribute. For MJCF and USD files, the attributes are
+those of the URDF that urdfkin writes for the file. For files of different formats, `diff` lists the
+differences that `same` finds.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ class ModelChange:
 
     Attributes:
         what: Name of the attribute, for example "origin x"; empty for a new or removed element.
-        size: Size of the change, for example "38.14 mm off"; empty for versions of the same format.
+        size: Size of the change, for example "38.14 mm off". Empty for versions of the same format, and for
+            changes of values such as limits.
     """
 
     element: str
@@ -121,7 +123,8 @@ class Changes:
         sources: Sources of the old and the new version.
         changes: The changes. Versions of the same format: first the robot's name, then joints, then links.
         effects: One entry for each joint or link whose changes move links. In this entry, all other joints
-            are unchanged. A joint whose effect cannot be computed, such as a new joint, has no entry.
+            are unchanged. Without an entry: a joint that moves no frame, and a joint whose effect cannot be
+            computed, such as a new joint.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
@@ -148,8 +151,8 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     """List the changes between two versions of a robot description.
 
     Versions of the same format are compared attribute by attribute. If the formats differ, for example URDF
-    and MJCF, `diff` lists the differences that `same` finds. Joints and links have the names of the old
-    version.
+    and MJCF, `diff` lists the differences that `same` finds. Matched joints and links then have the names of
+    the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -259,7 +262,7 @@ def _change_of(difference: Difference) -> Iterator[ModelChange]:
 
 
 def _rename_like_a(result: Sameness) -> KinematicTree:
-    """Return B's tree with A's names for all matched joints and links."""
+    """Return B's tree with A's names for matched joints and links, and for joints before matched links."""
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
@@ -299,7 +302,7 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Map names such as "origin x" to attributes."""
+    """Map names such as "origin x" to attributes, including a joint's default values."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -331,10 +334,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect if only the joint `name` of the old tree changes.
-
-    The result is None if no frame moves, or if the effect cannot be computed.
-    """
+    """Return the effect of the joint `name` alone; None if no frame moves or the effect is not computable."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

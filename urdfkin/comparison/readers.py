@@ -61,7 +61,7 @@ class LibraryReading:
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
         missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
-            the USD file) are listed.
+            the USD file) are listed. A root link that `load` added is not listed.
         worst: Largest difference between matching entries of link poses, relative to the first common link. 0
             if rounding can explain the difference.
     """
@@ -93,7 +93,7 @@ def compare_readers(
     """Compare how urdfkin and other libraries read a robot's file.
 
     By default, all installed libraries for the file's format are used. The poses of all common links are
-    compared at the neutral configuration and at random configurations.
+    compared in the neutral configuration and in `samples` random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
@@ -136,7 +136,7 @@ def joint_values(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _compare_reader(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Compare a library's link poses with urdfkin's link poses `ours`."""
+    """Compare a library's link poses with urdfkin's link poses `ours` (configurations, links, 4, 4)."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 #: Values of at least 0.9 m or 0.9 rad have no unit prefix.
 #: Smaller values have the largest unit prefix from m to p that makes the number at least 0.1.
 #: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
-#: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
+#: Values below 0.1 pm have no prefix. The two limits are 0.05 % below 0.9 and 0.1.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
@@ -90,7 +90,8 @@ class Interval:
         upper: Proven upper bound of the distance, m; inf without a bound.
         radians: Proven upper bound of the angle between the frames, rad; inf without a bound.
         radians_seen: Angle between A's frame at `q_a` and B's frame at `q_b`, rad.
-        q_a: Configuration of A; empty if the frame does not differ.
+        q_a: Configuration of A with the largest distance found. If `lower` is 0, the angle can be the largest
+            instead. Empty if the frames do not differ.
         q_b: The corresponding configuration of B.
     """
 
@@ -119,7 +120,7 @@ class Difference:
     """One difference between two models.
 
     Attributes:
-        place: The joint or link of A, for example "joint elbow".
+        place: The joint or link of A, for example "joint elbow"; of B if only B has it.
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         a: The parameter's value in A; None without a value.
         b: The parameter's value in B; None without a value.
@@ -139,7 +140,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The values in A and B. Each is None if it is missing, a mimic rule, or link names."""
+        """The values in A and B as numbers or texts; None for no value, a mimic rule and link names."""
         if self.what == "limits":
             return _format_range(self.a), _format_range(self.b)
         if self.what == "idle":
@@ -258,7 +259,7 @@ class Tool:
 
 
 #: Result of Pinocchio's check of the bounds.
-#: "not asked" means that the user requested no check.
+#: "not asked" means that the user requested no check, or that there is no bound to check.
 #: "not verified" means that Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _STATE_TEXTS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
@@ -314,14 +315,16 @@ class Sameness(Displayable):
 
     Attributes:
         names: The robots' names.
-        sources: The sources of A and B, as the user gave them.
-        digests: SHA-256 of the two texts.
+        sources: For A and B: a path, a catalogue name, or a label such as `<text>`.
+        digests: For A and B: SHA-256 of the URDF text, or of the MJCF or USD file.
         verdict: `Verdict.SAME`, `SAME_AFTER` (after the changes in `after`), `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, one line each. The models may differ even after these
             changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
-        differences: The differences, ordered from the base to the tips.
-        remarks: Differences without effect on motion: joint limits, joint types, links of one model.
+        differences: The differences, ordered from the base to the tips. Last are joints of only one model,
+            and links that different joints carry.
+        remarks: Differences without effect on motion, for example joint limits, joint types, and links of
+            only one model.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
         tools: Matched links that `same` reports as different tools.
@@ -337,13 +340,13 @@ class Sameness(Displayable):
             None if no file has single precision.
         unexplained: Differences between the unchanged models that rounding does not explain, by joint or
             link. The numbers of a USD file are rounded to single precision.
-        frames: One interval for each pair of matching links, after the changes in `after`. Empty if the
-            bounds were not computed.
+        frames: One interval for each pair of matching links, after the changes in `after`. Empty if
+            `same` was called with `bounds=False`.
         as_written: Interval of the frame with the largest distance found, without the changes in `after`.
-            None if `after` is empty, the bounds were not computed, or no frames can be compared.
+            None if `after` is empty, if no frames can be compared, or with `bounds=False`.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
-            unchanged models. Infinite if no bounds were proven. Of a Denavit-Hartenberg table, only frames
-            with equal names in A and B are compared.
+            unchanged models. Infinite if no bounds were proven. If A or B is a Denavit-Hartenberg table and
+            `after` is not empty, only frames with equal names in A and B are compared.
         narrowed: One line for each mimicked joint whose range exceeds the limits of its mimic joints. The
             distances in `frames` are computed for the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
@@ -418,7 +421,7 @@ class Sameness(Displayable):
     def worst_as_written(self) -> Interval | None:
         """The interval of the frame that differs most between the unchanged models.
 
-        A and B are compared at equal joint values.
+        A and B are compared at equal joint values. If `as_written` is None, the result is `worst`.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -511,7 +514,7 @@ class Sameness(Displayable):
         Coordinates that only B has are neutral.
 
         Raises:
-            InputError: q does not have A's length, or a coordinate is not finite.
+            InputError: q does not have A's length, or is not finite.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -862,7 +865,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _tilt_and_shift(pair: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return tilt (rad) and shift (m), each 0 if it is at most the tolerance in `rounding`."""
+    """Return the tilt (rad) and the shift (m), each 0 within the tolerance `rounding`."""
     return (
         pair.tilt if pair.tilt > rounding.angle else 0.0,
         pair.shift if pair.shift > rounding.distance else 0.0,

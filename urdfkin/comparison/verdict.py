@@ -1,4 +1,4 @@
-"""The function `same`, which decides whether two models are the same robot."""
+"""Decide whether two models are the same robot, and whether single precision causes their differences."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
 #: The search for the largest distance between the unchanged models uses at most this number of frames.
 MAX_REFINED_FRAMES = 4
-#: Maximum length (m) of a path from the root to a link; the square of a longer length could overflow.
+#: Maximum length (m) of a path from the root to a link; squares of lengths above 1.3e154 m overflow.
 MAX_PATH_METRES = 1e150
 #: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
 SHARP_FACTOR = 1.05
@@ -104,12 +104,16 @@ def same(
             tries to prove this limit for the distances of all matching frames.
 
     Returns:
-        The verdict, the matched joints and links, the differences, and an interval for every frame. The
-        interval contains the frame's largest distance within the joint limits.
+        The verdict, the matched joints and links, the differences, and an interval for every pair of matched
+        links. The interval contains the largest distance of the two links within the joint limits.
 
     Raises:
         UrdfError: a model has errors.
         SourceError, UnknownNameError, InputError: as for `load`.
+        UnknownNameError: `map` names a joint that the model does not have.
+        InputError: joints in `map` cannot be matched, another argument is wrong, or a path is longer than
+            1e150 m.
+        UrdfkinError: Pinocchio finds a distance above a proven bound.
 
     Example:
         >>> import urdfkin
@@ -213,10 +217,7 @@ class Comparator:
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
-        """Return the result without intervals.
-
-        Tool frames are stored in `alignment`.
-        """
+        """Return the result without intervals; store the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         changes = changes_of_b(alignment, self.tolerance, has_table=self.has_table)
@@ -280,7 +281,11 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound the displacement of frames by rounding (m, rad); None if no model has single precision."""
+        """Bound how far single precision and rounding can displace frames.
+
+        Returns:
+            Distance, m, and angle, rad; None if no model has single precision.
+        """
         if all(robot.single is None for robot in self.robots):
             return None
         pairs = [(frame.a, frame.b) for frame in alignment.frames]
@@ -307,10 +312,16 @@ class Comparator:
             return found
         back = align(b, a, _swap_pairs(alignment.names))
         other = JointComparison(back, (errors[1], errors[0]), base_as_written(b, a), self.tolerance)
-        return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
+        places = other.places_in_second_model()
+        return tuple(
+            replace(one, place=places.get(one.place, one.place))
+            if one.a is None
+            else replace(one, place=places.get(one.place, one.place), a=one.b, b=one.a)
+            for one in other.differences()
+        )
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Align the unchanged models, with joints and comparable links matched as in `alignment`."""
+        """Align the unchanged models. Joints, joint orders and comparable links are those of `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -395,7 +406,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Bound the displacements (m, rad) between unchanged models."""
+        """Bound the distance (m) and the angle (rad) between frames of the unchanged models."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -463,7 +474,10 @@ class Comparator:
         attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
-        """`attained`: the largest distance found (m), and the values of the variables there."""
+        """Return the interval of a frame.
+
+        `attained`: largest distance found (m), and the variables' values there; None if the frames agree.
+        """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
@@ -505,11 +519,7 @@ class Comparator:
         )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Return the distances that Pinocchio computes at random configurations.
-
-        Returns:
-            (frames,) largest distances, m.
-        """
+        """Return the largest distance (frames,), m, that Pinocchio computes at random configurations."""
         search = self.search(alignment, variables)
         q_a, q_b = search.configurations(search.random_values(CONFIRMATION_SAMPLES), random_free_joints=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
@@ -534,7 +544,7 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each translating joint and the travel of the joint (m), which is infinite without limits."""
+    """Yield each planar, floating and prismatic joint pair with its travel (m), infinite without limits."""
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
             yield step, math.inf
@@ -594,10 +604,10 @@ def _is_idle_mimic_joint(joint: Joint) -> bool:
 def _match_usd_spellings(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Match names that USD spells differently.
+    """Match names of a USD model and of another model that USD spells differently.
 
     Returns:
-        Link names of both robots, and matching joints (name in A to name in B).
+        Link names of both robots, in the other model's spelling; joint names of A, each with the name in B.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -613,7 +623,7 @@ def _match_usd_spellings(
 
 
 def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
-    """Map each USD spelling of exactly one original name to this name."""
+    """Map USD spellings to original names; omit a spelling with several possible original names."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -623,13 +633,10 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose of B's root.
+    """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
 
     If a link on B's root body has the name of A's root, this link coincides with A's root. If a link on A's
     root body has the name of B's root, this link coincides with B's root. Otherwise, the roots coincide.
-
-    Returns:
-        (4, 4) pose in A's root frame.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])
@@ -657,8 +664,8 @@ class JointComparison:
     **Compared quantities.** Two files can describe the same joint by different frames, and can have different
     fixed links. The compared quantities do not depend on these choices:
 
-        common link  a link that both models have
-        P            nearest of a common link's ancestors in A that is also a common link
+        common link  a link of A with a matching link of B
+        P            nearest ancestor of a common link in A that is also a common link
 
         for each common link, in the zero configuration, in the frame of P:
             pose of the link
@@ -717,7 +724,7 @@ class JointComparison:
     - A planar or floating joint is attached to the root body, and is the only joint from P to the link.
     - The frames of a planar or floating joint agree in A and B up to double precision.
 
-    If any condition does not hold, `same` reports the difference as not explained.
+    If a condition does not hold for a link, `same` reports this link as not explained.
 
     Args:
         errors: For A, and for B: (joints, 3) bounds on the errors of position (m), rotation (rad) and mimic
@@ -761,6 +768,20 @@ class JointComparison:
                 why = "no link after this joint has a matching link in the other model"
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
+    def places_in_second_model(self) -> dict[str, str]:
+        """Map each matched link and joint of the first model, for example "joint j", to its match.
+
+        A fixed joint is mapped to the joint before the link that matches its child link.
+        """
+        a, b = self.trees
+        places = {f"link {a.links[link]}": f"link {b.links[other]}" for link, other in self.pairs.items()}
+        for link, other in self.pairs.items():
+            if link and other:
+                places[f"joint {a.joints[link - 1].name}"] = f"joint {b.joints[other - 1].name}"
+        for step in self.alignment.steps:
+            places[f"joint {a.joints[step.a].name}"] = f"joint {b.joints[step.b].name}"
+        return places
+
     def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
         """Return P, the nearest ancestor that is a common link, and the joints from P to a link.
 
@@ -775,7 +796,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints from the last common ancestor to `start`, and the joints to `end`."""
+        """Return the joints from the last common ancestor to `start`, and those to `end`."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -840,7 +861,7 @@ class JointComparison:
     def _screws_and_pose(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the joint screws and the link pose in the frame of P, the nearest common link.
+        """Return the joint screws and the link pose in the frame of P.
 
         Args:
             which: 0 for A, 1 for B.

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from urdfkin.kinematics.inputs import FloatArray
 
-#: A few units in the last place of numbers of size one, as rounding causes.
+#: Tolerance for rounding errors of numbers of size one.
 ROUNDING = 16 * np.finfo(np.float64).eps
 
 

@@ -15,11 +15,18 @@ eps = 2^-52 or, for single precision, 2^-23:
 | Newton | a unit quaternion of single precision, 21.5; rounding q up to 2 pi, 3.2, the origin, 0.5, and roll,
   pitch and yaw up to pi, 4.8, to single precision | SINGLE |
 
-A velocity and a Jacobian have these factors more: one for the conversion, which rotates the velocity of the
-base. One more for MuJoCo, iDynTree and Newton: MuJoCo moves velocities from the centre of mass to the link,
-Newton from that of the link, and iDynTree rotates them from the link's axes. The lever arms of MuJoCo are
-longer by the distance of the centre of mass, that of Newton's base by the distance of its centre of mass; it
-is at most that of the farthest centre of mass of a link.
+The bounds of a velocity and a Jacobian have additional factors:
+
+| Library | Factors | Reason |
+|---|---|---|
+| all | 1 | the conversion rotates the velocity of the base |
+| MuJoCo | 1 | moves velocities from the robot's centre of mass to the link |
+| Newton | 1 | moves velocities from the link's centre of mass to the link |
+| iDynTree | 1 | rotates velocities from the link's axes |
+
+Lever arms in MuJoCo are longer by the distance of the robot's centre of mass. The lever arm of Newton's base
+is longer by the distance of the base's centre of mass. Both distances are at most the distance of the
+farthest centre of mass of a link.
 """
 
 from collections.abc import Callable
@@ -61,7 +68,10 @@ class Library:
 
 
 def bare(text: str) -> str:
-    """Return a URDF without meshes, in which every link has a mass and every joint has limits."""
+    """Return a URDF without meshes, in which every link has a mass of 1 kg.
+
+    A link `world` is renamed to `root`. Joints contain only kinematic elements and limits.
+    """
     root = parse_xml(text)
     for child in list(root):
         if child.tag not in ("link", "joint"):
@@ -71,7 +81,7 @@ def bare(text: str) -> str:
         for part in list(joint):
             if part.tag not in known or (part.tag == "mimic" and joint.get("type") == "fixed"):
                 joint.remove(part)
-    for element in root.iter():  # MuJoCo and Drake take a link "world" for the world
+    for element in root.iter():  # MuJoCo and Drake treat a link "world" as the world
         for attribute in ("link", "name") if element.tag in ("link", "parent") else ():
             if element.get(attribute) == "world":
                 element.set(attribute, "root")
@@ -253,7 +263,7 @@ def _of_newton(robot: Robot, builder: Any, spell_name: Callable[[str], str] = st
 
 
 def _stage(robot: Robot, folder: Path) -> Any:
-    """Return the stage that urdf-usd-converter writes, without its joint to the world for a free base."""
+    """Return the stage of urdf-usd-converter; if the base is free, without its joint to the world."""
     converter = pytest.importorskip("urdf_usd_converter")
     from pxr import Usd
 
@@ -266,7 +276,10 @@ def _stage(robot: Robot, folder: Path) -> Any:
 
 @dataclass(frozen=True)
 class _Prim:
-    """A joint prim: its bodies' paths, its frame on either body, its axis (None: fixed), whether it turns."""
+    """A joint prim: paths of its bodies, its pose in the parent, the child's pose in the joint, its axis.
+
+    The axis of a fixed joint is None.
+    """
 
     parent: str
     child: str
@@ -277,9 +290,10 @@ class _Prim:
 
 
 def usd(robot: Robot, folder: Path) -> Library:
-    """The joints of a stage, in its order; UsdPhysics defines q in degrees, and the base's velocities.
+    """Compute the forward kinematics of a stage from the frames and axes of its joint prims.
 
-    OpenUSD has no forward kinematics. It is computed here from the frames and axes of the joint prims.
+    OpenUSD has no forward kinematics. The joints have the stage's order. UsdPhysics uses degrees for q, and
+    degrees per second for angular velocities.
     """
     stage = _stage(robot, folder)
     from pxr import Gf, UsdPhysics
@@ -308,7 +322,7 @@ def usd(robot: Robot, folder: Path) -> Library:
     free = robot.root_joint is not None
 
     def walk(q: FloatArray, body: str) -> tuple[FloatArray, list[tuple[int, FloatArray, FloatArray | None]]]:
-        """Return T of a body, and of each joint on its path the column, z, and the origin if it turns."""
+        """Return a body's pose; for each joint on the path, the column, axis, and origin (revolute only)."""
         prim = prims.get(of_child.get(body, ""))
         if prim is None or not prim.parent:
             return matrix(Gf.Quatd(*q[3:7]), q[:3]) if free else np.eye(4), []

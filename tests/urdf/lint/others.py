@@ -22,7 +22,7 @@ def ask(documents: Sequence[str]) -> list[dict[str, str]]:
     return verdicts
 
 
-def _in_a_fork(question: Callable[[bytes], object], document: bytes) -> str:
+def _verdict_in_fork(question: Callable[[bytes], object], document: bytes) -> str:
     child = os.fork()
     if child == 0:
         try:
@@ -45,7 +45,7 @@ def _main() -> None:
         "yourdfpy": lambda x: URDF.load(io.BytesIO(x), build_scene_graph=False, load_meshes=False),
     }
     verdicts = [
-        {name: _in_a_fork(question, text.encode()) for name, question in questions.items()}
+        {name: _verdict_in_fork(question, text.encode()) for name, question in questions.items()}
         for text in json.load(sys.stdin)
     ]
     sys.stdout.write("\n" + json.dumps(verdicts) + "\n")

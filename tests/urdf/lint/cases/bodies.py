@@ -15,9 +15,9 @@ CASES = [
     Case("inertial-zero", inertial(BALL.replace('"1"', '"0"'), '<mass value="0"/>'), ACCEPT),
     Case("inertial-no-mass-but-moments", inertial(BALL, '<mass value="0"/>'), WARN, "URDF702:3"),
     Case("inertial-rounding", inertial(BALL.replace('"1"', '"-1e-20"')), ACCEPT),
-    # Shapes.
     Case("inertial-nan", inertial(BALL.replace('ixx="1"', 'ixx="nan"')), WARN, "URDF704:3"),
     Case("inertial-mass-text", inertial(BALL, '<mass value="1kg"/>'), WARN, "URDF704:3"),
+    # Shapes.
     Case("visual-no-geometry", base_link("<visual/>"), WARN, "URDF705:3"),
     Case("visual-no-shape", base_link(shape("")), WARN, "URDF705:3"),
     Case("visual-unknown-shape", base_link(shape("<cone/>")), WARN, "URDF705:3"),

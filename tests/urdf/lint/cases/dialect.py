@@ -4,22 +4,22 @@ from tests.urdf.lint.cases.arm import ACCEPT, LIMIT, MESH, REJECT, SPHERE, WARN,
 
 _INCLUDE = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd"/>'
 _XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'
-_SAID = "<!-- urdfkin: ignore[{}] as drawn -->"
+_IGNORE_COMMENT = "<!-- urdfkin: ignore[{}] as drawn -->"
 _LONG = '<axis xyz="0 0 2"/>'
 _CP1252 = '<?xml version="1.0" encoding="cp1252"?>\n'
 
 
-def _called(name: str) -> str:
-    """Write the arm with an additional link."""
+def _with_link(name: str) -> str:
+    """Write the arm with an additional link of this name."""
     return arm(more=f'<link name="{name}"/>' + fixed("k", "tool", name))
 
 
-def _before(comment: str, text: str = arm(axis=_LONG)) -> str:
+def _with_comment(comment: str, text: str = arm(axis=_LONG)) -> str:
     """Write the arm with a comment on its own line before joint j1, whose axis is too long."""
     return text.replace('  <joint name="j1"', f'  {comment}\n  <joint name="j1"')
 
 
-_SILENCED_ERROR = _before(_SAID.format("URDF502"), axis("0 0 0"))
+_SILENCED_ERROR = _with_comment(_IGNORE_COMMENT.format("URDF502"), axis("0 0 0"))
 
 CASES = [
     # Other formats, xacro, versions.
@@ -81,24 +81,37 @@ CASES = [
     Case("joint-without-name", arm(more='<link name="x"/>' + fixed("", "base", "x")), REJECT, "URDF401:8"),
     Case("link-universe", arm(more='<link name="universe"/>' + fixed("u", "tool", "universe")), WARN),
     Case("joint-universe", arm(more='<link name="x"/>' + fixed("universe", "tool", "x")), WARN, "URDF404:8"),
-    Case("name-with-blank-end", _called("x "), WARN, "URDF405:8"),
-    Case("name-escape-sequence", _called("&#x9b;31m"), WARN),
-    Case("name-line-end", _called("a\nb"), WARN, "URDF406:8"),
-    Case("name-shell", _called("$(rm x)"), WARN),
-    Case("name-html", _called("&lt;b&gt;"), WARN),
-    Case("name-very-long", _called("n" * 5000), WARN),
+    Case("name-with-blank-end", _with_link("x "), WARN, "URDF405:8"),
+    Case("name-escape-sequence", _with_link("&#x9b;31m"), WARN),
+    Case("name-line-end", _with_link("a\nb"), WARN, "URDF406:8"),
+    Case("name-shell", _with_link("$(rm x)"), WARN),
+    Case("name-html", _with_link("&lt;b&gt;"), WARN),
+    Case("name-very-long", _with_link("n" * 5000), WARN),
     # Comments that silence findings.
-    Case("silenced-before-the-joint", _before(_SAID.format("URDF503")), ACCEPT),
-    Case("silenced-by-its-name", _before(_SAID.format("axis-not-unit")), ACCEPT),
-    Case("silenced-with-others", _before(_SAID.format("URDF601, URDF503")), ACCEPT, "URDF121:6"),
-    Case("silenced-behind-it", arm(axis=_LONG).replace("t>", "t> " + _SAID.format("503"), 1), ACCEPT),
-    Case("silenced-for-the-file", arm(head=_CP1252 + _SAID.format("104 503"), axis=_LONG), ACCEPT),
-    Case("silenced-elsewhere", arm(axis=_LONG, more=_SAID.format("URDF503")), WARN, "URDF503:6 URDF121:8"),
-    Case("silenced-another-code", _before(_SAID.format("URDF601")), WARN, "URDF503:7 URDF121:6"),
-    Case("silenced-without-a-reason", _before("<!--urdfkin: ignore[503]-->"), WARN, "URDF120:6"),
-    Case("silenced-no-code", _before(_SAID.format("")), WARN, "URDF120:6 URDF503:7"),
-    Case("silenced-unknown-code", _before(_SAID.format("URDF5O3")), WARN, "URDF120:6 URDF503:7"),
-    Case("silence-not-understood", _before("<!-- urdfkin: noqa -->"), WARN, "URDF120:6"),
+    Case("silenced-before-the-joint", _with_comment(_IGNORE_COMMENT.format("URDF503")), ACCEPT),
+    Case("silenced-by-its-name", _with_comment(_IGNORE_COMMENT.format("axis-not-unit")), ACCEPT),
+    Case(
+        "silenced-with-others", _with_comment(_IGNORE_COMMENT.format("URDF601, URDF503")), ACCEPT, "URDF121:6"
+    ),
+    Case(
+        "silenced-behind-it", arm(axis=_LONG).replace("t>", "t> " + _IGNORE_COMMENT.format("503"), 1), ACCEPT
+    ),
+    Case("silenced-for-the-file", arm(head=_CP1252 + _IGNORE_COMMENT.format("104 503"), axis=_LONG), ACCEPT),
+    Case(
+        "silenced-elsewhere",
+        arm(axis=_LONG, more=_IGNORE_COMMENT.format("URDF503")),
+        WARN,
+        "URDF503:6 URDF121:8",
+    ),
+    Case(
+        "silenced-another-code", _with_comment(_IGNORE_COMMENT.format("URDF601")), WARN, "URDF503:7 URDF121:6"
+    ),
+    Case("silenced-without-a-reason", _with_comment("<!--urdfkin: ignore[503]-->"), WARN, "URDF120:6"),
+    Case("silenced-no-code", _with_comment(_IGNORE_COMMENT.format("")), WARN, "URDF120:6 URDF503:7"),
+    Case(
+        "silenced-unknown-code", _with_comment(_IGNORE_COMMENT.format("URDF5O3")), WARN, "URDF120:6 URDF503:7"
+    ),
+    Case("silence-not-understood", _with_comment("<!-- urdfkin: noqa -->"), WARN, "URDF120:6"),
     Case("an-error-cannot-be-silenced", _SILENCED_ERROR, REJECT, "URDF502:7 URDF121:6"),
-    Case("a-comment-for-others", _before("<!-- noqa: URDF503 urdfkin: ignore -->"), WARN, "URDF503:7"),
+    Case("a-comment-for-others", _with_comment("<!-- noqa: URDF503 urdfkin: ignore -->"), WARN, "URDF503:7"),
 ]

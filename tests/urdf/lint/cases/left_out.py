@@ -2,7 +2,7 @@
 
 
 class Mjcf:
-    """An MJCF text and the code and message of all its findings."""
+    """An MJCF text with all findings, each as (code, message)."""
 
     def __init__(self, name: str, text: str, *findings: str) -> None:
         self.name, self.text = name, text
@@ -30,7 +30,7 @@ def _hinge(ends: str, **parts: str) -> str:
     return _two(joint=f'type="hinge" limited="true" range="{ends}"', **parts)
 
 
-def _held(*equalities: str) -> str:
+def _equality(*equalities: str) -> str:
     return _two(more=f"<equality>{''.join(equalities)}</equality>")
 
 
@@ -40,32 +40,32 @@ _SPATIAL = '<tendon><spatial name="t"><site site="s"/><site site="r"/></spatial>
 _MOTOR = '<actuator><motor joint="a"/></actuator>'
 CASES = [
     Mjcf("nothing", _two()),
-    Mjcf("a-line-between-two-joints", _held('<joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/>')),
+    Mjcf("a-line-between-two-joints", _equality('<joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/>')),
     Mjcf(
-        "a-weld", _held('<weld name="glue" body1="one" body2="two"/>'),
+        "a-weld", _equality('<weld name="glue" body1="one" body2="two"/>'),
         "MJCF101 equality glue: a constraint (weld of one and two) that a tree cannot represent",
     ),
     Mjcf(
-        "a-connection", _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
+        "a-connection", _equality('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
         "MJCF101 equality pin: a constraint (connect of one and two) that a tree cannot represent",
     ),
     Mjcf(
         "a-curve-between-two-joints",
-        _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
+        _equality('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
         "MJCF101 equality bent: a constraint (b and a) that is not a linear relation of two joints",
     ),
     Mjcf(
         "a-joint-held-twice",
-        _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="b" joint2="a"/>'),
+        _equality('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="b" joint2="a"/>'),
         "MJCF101 equality y: joint b has two rules, or its rules form a cycle",
     ),
     Mjcf(
         "two-joints-that-hold-each-other",
-        _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="a" joint2="b"/>'),
+        _equality('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="a" joint2="b"/>'),
         "MJCF101 equality y: joint a has two rules, or its rules form a cycle",
     ),
     Mjcf(
-        "a-constraint-that-is-off", _held('<joint name="x" joint1="b" joint2="a" active="false"/>'),
+        "a-constraint-that-is-off", _equality('<joint name="x" joint1="b" joint2="a" active="false"/>'),
         "MJCF102 equality x: a constraint that is not active",
     ),
     Mjcf(

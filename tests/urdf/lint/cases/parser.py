@@ -5,7 +5,7 @@ from tests.urdf.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, bou
 _PLAIN = arm()
 _UTF16 = _PLAIN.replace("<?xml", '<?xml encoding="UTF-16"').encode("utf-16")
 _NEW = 'name="r" version="1.2"'
-#: An external DTD, or an entity that reads a file.
+#: A DTD with a default value of an attribute, and a DTD with an entity that reads a file.
 _DEFAULT = '<!DOCTYPE robot [<!ATTLIST origin xyz CDATA "9 9 9">]>'
 _ENTITY = '<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd">%p;]>'
 
