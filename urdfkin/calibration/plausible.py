@@ -287,7 +287,7 @@ class _Correction:
 
     Attributes:
         first_pose: Index of the pose that belongs to the first row of `q`.
-        end_pose: One more than the index of the pose that belongs to the last row; None: the number of poses.
+        end_pose: Index after the pose that belongs to the last row of `q`; None: the last pose belongs to it.
     """
 
     reason: str

@@ -684,7 +684,11 @@ def _sort_key(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
-    """Return some findings; `other_lines` of the last has the line numbers of all others."""
+    """Return the findings that are printed.
+
+    `other_lines` of the last returned finding contains the line numbers of the findings that are not
+    returned.
+    """
     group.weighted_findings.sort(key=lambda pair: _sort_key(pair[0]))
     findings = [finding for finding, _ in group.weighted_findings]
     into_one = fold and group.severity is not Severity.ERROR

@@ -60,7 +60,7 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_joints_twice(usd: Usd) -> dict[str, Any]:
-    """Return urdfkin's and UsdPhysics's description of each joint, by path; None is a missing joint."""
+    """Return the joints' descriptions by urdfkin and by UsdPhysics, by path; None: the joint is missing."""
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange

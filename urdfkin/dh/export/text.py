@@ -65,7 +65,7 @@ def format_coordinate_names(table: DHTable) -> str:
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
-    """Return the mimic rule's offsets of theta and d."""
+    """Return the offsets that the mimic rule of a row adds to theta and d."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
     return (offset, 0.0) if row.kind.turns else (0.0, offset)
 
@@ -312,7 +312,7 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
-    """Return the largest absolute value of the joint that the row's joint mimics.
+    """Return the largest absolute value of the joint that the joint of `row` mimics.
 
     The value is 0 without a mimic rule, or with the multiplier 0.
     """

@@ -77,11 +77,10 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """The largest number of comparisons for decisions between equally good choices.
+    """A limit on the number of comparisons of later joints, shared by several matchers.
 
-    Each comparison takes one joint of A and one joint of B after the chosen joints.
-
-    Several matchers can share a limit.
+    If several choices at a joint are equally good, later joints decide. Each comparison takes one joint of
+    A and one joint of B.
 
     Attributes:
         remaining: Number of joint pairs that may still be compared.

@@ -639,7 +639,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a copy without translations, because translations do not change free vectors."""
+    """Return a copy of a step without translations; a translation does not change a free vector."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
@@ -651,8 +651,8 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints that affect the length of D, with their values.
 
-    The result begins at the first joint that differs. If an earlier joint shares a variable with
-    a joint of the result, the result begins at the earlier joint.
+    The result begins at the first joint that differs, or at an earlier joint that has the same variable as a
+    later joint of the result.
     """
     steps, pairs = (
         alignment.path(frame.previous),
