@@ -153,9 +153,9 @@ October 2000. Well-known equations are:
 * transverse, centripetal and Coriolis acceleration (7.125);
 * the forward recursion (7.127 to 7.130).
 
-Tests check this table. Each equation except the {len(lost)} lost equations has a row. Each function and each
-named test exists. If a function computes an equation slightly wrong, at least one test of the equation fails.
-If a row states no other frame, vectors are expressed in frame 0."""
+Tests check this table. Each equation except the {len(lost)} equations on the lost page has a row. Each
+function and each test in the table exists. If a function computes an equation slightly wrong, at least one
+test of the equation fails. If a row states no other frame, vectors are expressed in frame 0."""
 
 
 def _row(equation: Equation) -> str:
