@@ -109,7 +109,8 @@ class DistanceSearch:
 
         Args:
             z: (n, variables) values of the variables.
-            random_free_joints: Whether A's planar and floating joints are random instead of neutral.
+            random_free_joints: Whether A's planar and floating joints have random coordinates. If False,
+                their coordinates are neutral.
 
         Returns:
             (n, nq) configurations of both robots.

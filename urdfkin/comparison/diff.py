@@ -122,9 +122,9 @@ class Changes:
     Attributes:
         sources: Sources of the old and the new version.
         changes: The changes. Versions of the same format: first the robot's name, then joints, then links.
-        effects: One entry for each joint or link whose changes move links. In this entry, all other joints
-            are unchanged. Without an entry: a joint that moves no frame, and a joint whose effect cannot be
-            computed, such as a new joint.
+        effects: One entry for each joint or link whose changes move links. Each entry is the effect if all
+            other joints are unchanged. Without an entry: a joint that moves no frame, and a joint whose
+            effect cannot be computed, such as a new joint.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`

@@ -45,7 +45,8 @@ class ReaderDifference:
     """A joint that a library reads differently.
 
     Attributes:
-        size: Largest difference between matching entries of the child link's pose in the parent link's frame.
+        size: Largest difference between an entry of urdfkin's matrix and the same entry of the library's
+            matrix. The matrix is the pose of the child link in the parent link's frame.
     """
 
     joint: str

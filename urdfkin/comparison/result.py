@@ -447,8 +447,8 @@ class Sameness(Displayable):
         """Whether single precision can explain the displacement of every frame.
 
         The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
-        wrong number can also move frames by less than this limit. Therefore, only `up_to_single` proves that
-        rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
+        wrong number can also cause a displacement below the limit. Therefore, only `up_to_single` proves
+        that rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -744,8 +744,8 @@ def _support_link_pairs(alignment: Alignment) -> set[tuple[int, int]]:
 def _support_and_side_links(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     """Return the links of the root body that support the robot, and those beside the robot.
 
-    A supporting link has a fixed child that carries all moving joints, for example a pedestal. A link beside
-    the robot carries no moving joint, for example a table.
+    A supporting link, for example a pedestal, has a fixed child that carries all moving joints. A link beside
+    the robot, for example a table, carries no moving joint.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)

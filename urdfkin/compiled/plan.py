@@ -481,9 +481,9 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state of `step` if an event after event `following` needs the state.
+        """Save the state of `step` to memory if an event after the next event uses the state.
 
-        `following` is the index of the next event. At this event, the state is still in the registers.
+        `following` is the index of the next event. The next event finds the state in the registers.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))

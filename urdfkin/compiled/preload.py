@@ -99,8 +99,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single_evaluator(name: str) -> bool:
     """Return whether to use the kernel `one_configuration`, after loading the kernel if necessary.
 
-    The answer is False until a batch kernel of the quantity `name` is loaded. Each later call adds the time
-    that `one_configuration` could have saved.
+    The result is False until a batch kernel of the quantity `name` is loaded. Each later call passes
+    the time that `one_configuration` saves in one call to `add_time`.
     """
     if _modes:
         return _modes[-1] == "compiled"

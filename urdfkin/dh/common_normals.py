@@ -290,7 +290,7 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         revolute joint, i > 0 or reference d = 0      d of the reference
         other joints                                  d with which another cell equals the reference
 
-    The other cell is d of a later row, or a of a Hayati row. Without such a cell, d equals the reference.
+    The other cell is d of a later row, or a of a Hayati row. If neither exists, d equals d of the reference.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):

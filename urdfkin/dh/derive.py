@@ -193,7 +193,7 @@ def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[Pos
     """Shift the axis of the prismatic joint k if a neighbouring axis is nearly parallel.
 
     The shifted axis passes through the neighbouring joint's origin.
-    Without the shift, the common normal of the two axes could be far away from the robot.
+    Without this shift, the common normal of two nearly parallel axes could be far away from the robot.
     """
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)

@@ -217,7 +217,7 @@ def _find_arm_kinds(
 
 
 def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the closed-form solvers for the exact and the approximate properties."""
+    """Return the closed-form solvers for the arm. Approximate properties of the arm count as exact."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:

@@ -327,7 +327,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Compute 7.57 for a quaternion of any length except 0."""
+    """Return the time derivative (7.57) of a quaternion of any length except 0."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates

@@ -83,8 +83,9 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Return the names of robots without checks, grouped by verdict and reason, for groups of more than four.
+    """Return the names of robots without checks, grouped by verdict and reason.
 
+    Groups of at most four robots are left out.
     For example, all robots that an interrupted validation did not reach have the same reason.
     """
     names: dict[tuple[str, str | None], list[str]] = {}

@@ -65,7 +65,7 @@ def _expand(
 def _replace_evaluation(path: Path, search_paths: Mapping[str, str], allowed_paths: AllowedPaths) -> None:
     """Make xacro call urdfkin's functions to evaluate expressions and to find packages.
 
-    Raise RefusedError if xacro still evaluates expressions itself.
+    Raise RefusedError if this version of xacro does not call urdfkin's function to evaluate expressions.
     """
     import xacro
     import xacrodoc.packages

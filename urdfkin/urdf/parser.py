@@ -141,9 +141,9 @@ def _check_declaration(report: Reporter, text: bytes, declared: str | None) -> b
 
 
 def _find_codec(name: str) -> str | None:
-    """Return Python's lower-case name of an encoding without hyphens, except for `utf-8`.
+    """Return Python's name of an encoding, in lower case.
 
-    Return None for an unknown encoding.
+    All hyphens are removed, except in `utf-8`. Return None for an unknown encoding.
     """
     try:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")

@@ -262,9 +262,9 @@ class _FrameComparison(_Comparison):
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Compare urdfkin's result for a link also with Pinocchio's result for the link's parent joint.
+        """Compare urdfkin's result for a link with Pinocchio's results for the link and for its parent joint.
 
-        Both have the same frame, but Pinocchio has different functions for joints and links.
+        The link and the joint have the same frame, but Pinocchio has different functions for them.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():

@@ -79,7 +79,7 @@ def check(tree: KinematicTree, samples: int, allowed_bytes: int | None) -> None:
 
 
 def _find_free_bytes() -> Iterator[int]:
-    """Yield the free bytes: of the machine, of control groups, under RLIMIT_AS."""
+    """Yield the free memory (bytes) of the machine, of each control group, and below the limit RLIMIT_AS."""
     for line in _read_lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024

@@ -156,8 +156,8 @@ class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
     Args:
-        crash_reason: Reason in the report of a robot that crashed its process; each process then validates
-            one robot. None: a process can validate several robots.
+        crash_reason: Reason in the report of a robot that crashed its process. With a reason, each process
+            validates only one robot. With None, a process can validate several robots.
     """
 
     def __init__(

@@ -84,7 +84,8 @@ class Magnitudes:
     """Upper bounds on the lengths of a frame's position, velocities and accelerations.
 
     Attributes:
-        p: (n, frames) path length from the world's origin, with the joints' displacements, m.
+        p: (n, frames) length of the path from the world's origin to the frame, including the displacements
+            of joints, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
@@ -722,8 +723,9 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    False entries are 0 for every q. In WORLD with `root_at_origin`, a base motion can make a False entry
-    nonzero. Only WORLD depends on `root_at_origin`.
+    If the result is False, the Jacobian entry is 0 for every q. Exception: for the reference WORLD with
+    `root_at_origin=True`, a base motion can make this Jacobian entry nonzero. For the other references, the
+    result does not depend on `root_at_origin`.
 
         linear rows of a revolute joint: z x d
         WORLD: d leads from the joint to the world's origin

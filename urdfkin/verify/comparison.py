@@ -94,7 +94,7 @@ def worst_disagreements(
 ) -> FloatArray:
     """Return the largest difference in each result, in multiples of eps * scale.
 
-    The first `leading_axes` axes of `ours` are the axes of the batch; each result has the other axes.
+    The first `leading_axes` axes of `ours` are batch axes. The remaining axes are the axes of one result.
 
     Returns:
         Array of shape `ours.shape[:leading_axes]`.

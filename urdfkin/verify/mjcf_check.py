@@ -57,10 +57,10 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
-        answer: Last answer of the process that contains a robot.
+        answer: Last answer with a robot; the process that reads the file can send several answers.
         shapes_refusal: None if the robot comes from the complete file. Otherwise, the robot comes from
-            the file without shapes and inertias, and the text says why. The text has no meaning if
-            `read_mjcf` was called without `with_check_data`.
+            the file without shapes and inertias, and `shapes_refusal` is the reason. `shapes_refusal` has no
+            meaning if `read_mjcf` was called without `with_check_data`.
         pinocchio: Placements of the bodies by Pinocchio's MJCF reader, or an error. None without an answer.
     """
 

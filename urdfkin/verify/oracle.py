@@ -613,7 +613,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: the tree has other joints or another order, or a mimic rule cannot be read.
+            OracleError: the joints or coordinates of the oracle and the tree differ in name or order, or a
+                mimic rule cannot be read.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}

@@ -84,8 +84,8 @@ class Singularity(Displayable):
         full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
         lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin.
-            Directions in which the frame never moves are left out. If such directions depend on q or on a
-            moving base, the array is empty.
+            Directions in which the frame never moves are left out. If the directions in which the frame never
+            moves depend on q or on a moving base, the array is empty.
         null_motions: (e, nv) independent joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons.
 
@@ -183,7 +183,10 @@ class _SingularityExplainer:
         return Singularity(self._rank, full_rank, smallest_value_bound, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Return the largest rank, and orthonormal columns of directions without motion in all samples."""
+        """Return the largest rank of the sampled Jacobians, and a matrix of directions without motion.
+
+        The frame does not move in these directions in any sample. The matrix has orthonormal columns.
+        """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         generic_rank = max(
             int(np.linalg.matrix_rank(J, tol=_RANK_TOLERANCE * np.linalg.norm(J))) for J in samples

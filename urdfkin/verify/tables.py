@@ -246,13 +246,14 @@ def compute_relative_motion(
 class ErrorScales:
     """Lengths, sums of |v| and |a|, and relative errors, for the bounds on rounding errors.
 
+    All sums are over the joints on the paths from the root to the table's base and tip.
+
     Attributes:
         reach: (n,) reach, m; see the module's docstring.
-        turning: (columns,) sum of |multiplier| over revolute joints
-            on the paths from the root to the table's base and tip.
-        sliding: (columns,) sum of |multiplier| over prismatic joints on these paths.
-        rates: (n,) sum of |multiplier v| over the joints on these paths.
-        accelerations: (n,) sum of |multiplier a| over these joints.
+        turning: (columns,) sum of |multiplier| over the revolute joints.
+        sliding: (columns,) sum of |multiplier| over the prismatic joints.
+        rates: (n,) sum of |multiplier * v| over all joints.
+        accelerations: (n,) sum of |multiplier * a| over all joints.
         rounding: (n,) relative error. The bound includes angles between axes that the table treats as
             parallel.
     """

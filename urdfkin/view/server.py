@@ -327,8 +327,9 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 def _remove_message_handlers(server: Any) -> None:
     """Remove the handlers of viser's server, for example for sharing, uploads and commands.
 
-    The handlers of the messages in `_ACCEPTED_MESSAGES` remain. Each page's connection has further handlers.
-    They affect only this page's camera, pictures and own controls. urdfkin gives no page its own controls.
+    The function does not remove the handlers of the messages in `_ACCEPTED_MESSAGES`. Each page's connection
+    has further handlers, which affect only the page's camera, pictures and own controls. urdfkin gives no
+    page its own controls.
     """
     try:
         websocket_server = server._websock_server

@@ -291,7 +291,7 @@ class Axis:
 
 
 def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
-    """Yield values (rad or m) of the joint with the axis u that may move `axis_b` to `axis_a`."""
+    """Yield values (rad or m) of the joint with axis u at which `axis_b` may coincide with `axis_a`."""
     if not turns:
         coordinates = (
             axis_a.nearest_point_coordinate(u.direction),

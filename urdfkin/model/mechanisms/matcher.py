@@ -98,8 +98,9 @@ class BodyPair:
         previous: Index in `Alignment.steps` of the joint pair before the bodies.
             -1 at the first bodies, in `_score_ahead` and in `_poses_after`.
         motion_a: (4, 4) motion G, the product of the motions L at earlier joints.
-        motion_b: (4, 4) motion of B's body by the root pose, and by earlier zero offsets and conversions.
-            The matcher compares motion_a @ (zero pose of A's link) with motion_b @ (zero pose of B's link).
+        motion_b: (4, 4) motion of B's body due to the root pose, and due to earlier zero offsets and
+            conversions. The matcher compares motion_a @ (zero pose of A's link) with motion_b @ (zero pose of
+            B's link).
     """
 
     bodies: tuple[int, int]

@@ -266,7 +266,7 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        separating_joints: Indices in `tree.joints` of fixed joints that move in the other model.
+        separating_joints: Indices in `tree.joints` of fixed joints that are moving joints in the other model.
         labels: Label of each link, by default its name. Links with equal labels are paired.
         free_frames: Whether a convention chooses the links' frames, as in a Denavit-Hartenberg table.
 
@@ -409,7 +409,7 @@ class Mechanism:
     def rotation_rounding(self) -> float:
         """Rounding error (rad) of the links' rotations.
 
-        The error (m) of the links' positions is this error times `size`.
+        The rounding error (m) of the links' positions is the error of the rotations times `size`.
         The program that wrote the file rounded each joint's constant transform and axis.
         The parser rounds these numbers again. A program that merges fixed joints rounds less often.
         The error includes the angles between Pinocchio's and the URDF's axes.
@@ -535,8 +535,8 @@ class FramePair:
         constant_motion: Rigid motion L (4, 4) after the last joint; the module docstring defines L.
         tilt: Angle between the frames, rad.
         shift: Distance between the origins, m.
-        tool: (4, 4) pose of B's link in the frame of A's link, for different end-effector frames.
-            Otherwise the identity.
+        tool: (4, 4) pose of B's link in the frame of A's link, if the links are different end-effector
+            frames. Otherwise, the identity.
     """
 
     a: int
@@ -611,7 +611,8 @@ class Alignment:
     def inner_difference_range(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
-        Both are 0 if no pair differs. A link pair is ignored if neither link has a child joint.
+        A link pair is ignored if neither link has a child joint. The result is (0, 0) if no other pair
+        differs.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -639,7 +640,7 @@ class Alignment:
         """Yield sets of two joint pairs that can exchange their partners.
 
         Both pairs have the same kind and the same previous pair.
-        Each of the two pairs differs, or a later joint pair or link pair differs.
+        Each pair of the set differs, or a joint pair or link pair after it on a path from the base differs.
         In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
@@ -769,7 +770,7 @@ class Variables:
             joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
         rule_differences: Indices of the joint pairs with different mimic rules.
-        coordinates_b: Each coordinate of B as a function of a variable, by B's joint name.
+        coordinates_b: Function of a variable for each coordinate of B. The keys are the names of B's joints.
     """
 
     pairs: tuple[MatchedValues | None, ...]

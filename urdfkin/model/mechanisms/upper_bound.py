@@ -560,7 +560,10 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield the indices i and j <= i of two joints, and a bound on the second derivative of D."""
+    """Yield joint indices i and j <= i, and an upper bound on the length of the second derivative of D.
+
+    The derivative is by the values of joints i and j.
+    """
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
