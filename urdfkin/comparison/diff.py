@@ -121,7 +121,7 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes. Versions of the same format: first the robot's name, then joints, then links.
+        changes: The changes. If the formats are equal, the robot's name comes first, then joints, then links.
         effects: One entry for each joint or link whose changes move links. In this entry, all other joints
             are unchanged. Without an entry: a joint that moves no frame, and a joint whose effect cannot be
             computed, such as a new joint.
