@@ -295,7 +295,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _list_urdf_files(robot: str) -> list[str]:
-    """Return the .urdf files in a folder and its subfolders; otherwise, return only `robot`."""
+    """Return `robot`; if `robot` is a folder, return the .urdf files in it and its subfolders."""
     from urdfkin.urdf.lint.settings import DEFAULT_INCLUDE, Settings, find_files
 
     if robot in catalogue() or not is_folder(Path(robot)):

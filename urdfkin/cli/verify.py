@@ -100,7 +100,8 @@ def verify_command(
     contains a quantity, for example `jacobian`. The arguments of a function are the arrays q (nq,), v (nv,)
     and a (nv,), in rad, m and seconds. A function for a pose or a Jacobian has only the argument q. The
     function returns an array. --program checks a program in any language: the program reads lines of JSON and
-    answers each line with a line {"result": [...]}. The file and the program run with your rights.
+    answers each line with a line {"result": [...]}. The file and the program run with the permissions of your
+    user account.
 
     The command calls the function in the zero configuration, at the joint limits, and in random
     configurations. If a common mistake explains wrong results, the command names the mistake. Examples are a

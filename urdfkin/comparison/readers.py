@@ -188,7 +188,10 @@ def _compare_reader(
 
 
 def _library_input(robot: Robot) -> tuple[str, str]:
-    """Return the URDF text, or the path of the MJCF or USD file; and the format, for example "urdf"."""
+    """Return the input of a library and its format, for example "urdf".
+
+    The input is the URDF text, or the path of the MJCF or USD file.
+    """
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:

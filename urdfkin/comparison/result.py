@@ -122,8 +122,8 @@ class Difference:
     Attributes:
         place: The joint or link of A, for example "joint elbow"; of B if only B has it.
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
-        a: The parameter's value in A; None without a value.
-        b: The parameter's value in B; None without a value.
+        a: The parameter's value in A; None if A has no value.
+        b: The parameter's value in B; None if B has no value.
         radians: Angular part of the difference, rad.
         metres: Linear part of the difference, m.
         detail: "alone": the axis differs, but the links after the joint agree. "converted": the limits of B
@@ -342,8 +342,8 @@ class Sameness(Displayable):
             link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`. Empty if
             `same` was called with `bounds=False`.
-        as_written: Interval of the frame with the largest distance found, without the changes in `after`.
-            None if `after` is empty, if no frames can be compared, or with `bounds=False`.
+        as_written: Interval of the frame with the largest distance found. The changes in `after` are not
+            applied. None if `after` is empty, if no frames can be compared, or with `bounds=False`.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. If A or B is a Denavit-Hartenberg table and
             `after` is not empty, only frames with equal names in A and B are compared.

@@ -527,7 +527,7 @@ class Comparator:
 
 
 def _bound_of_verdict(result: Sameness) -> float | None:
-    """Return the bound (m) on all distances that follows from the verdict; None for models that differ."""
+    """Return the verdict's bound (m) on all distances; None if the models differ."""
     if result.verdict is Verdict.DIFFERS:
         return None
     if result.verdict is Verdict.UP_TO_SINGLE and result.single is not None:

@@ -104,7 +104,7 @@ class CompiledTree:
 
     `target_columns`: joints with the same index in v share the column of the first joint on the path.
     `lengths`: sum of `Joint.length` over the joints after the previous moving joint, fixed joints included.
-    Without a previous moving joint, the sum begins at the base.
+    If there is no previous moving joint, the sum begins at the base.
     """
 
     nq: int
@@ -401,7 +401,7 @@ def compile_program(
 ) -> KernelProgram:
     """Return the program for a tree's frames.
 
-    Placements, and results in frame axes, need `orientations`.
+    `orientations` must be true for placements and for results in frame axes.
     A Hessian needs separate columns for mimic joints.
     """
     key = orientations, columns, hessian
@@ -500,7 +500,7 @@ class _ProgramWriter:
         return len(self.constants) - len(numbers)
 
     def _add_transform(self, R: FloatArray, p: FloatArray, *, orientations: bool = True) -> bool:
-        """Add the needed instructions, and return whether there are any."""
+        """Add the needed instructions; return whether an instruction was added."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:

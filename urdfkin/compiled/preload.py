@@ -205,7 +205,10 @@ def all_kernels_on_disk() -> bool:
 
 
 def load_all_kernels() -> None:
-    """Load or compile the kernels of both groups, without `hessians`, `imus` and `one_configuration`."""
+    """Load or compile the kernels of both groups.
+
+    `hessians`, `imus` and `one_configuration` are in neither group.
+    """
     missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_PROCESS_KERNELS))
     compiler = _start_compiler(_SECOND_PROCESS_KERNELS) if missing else None
     try:

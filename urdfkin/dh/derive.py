@@ -303,7 +303,7 @@ def _match_first_row(
 ) -> tuple[FloatArray, tuple[float, float]]:
     """Copy theta from the reference, and adjust the base.
 
-    If the reference has d = 0, d becomes 0.
+    If d is 0 in the reference, the returned d is 0.
     """
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
@@ -318,8 +318,8 @@ def _match_last_row(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Copy theta, a and alpha from the reference, and adjust the tool.
 
-    If the reference has d = 0, d becomes 0.
     Nothing is copied if both tables have no tool and their thetas differ by less than 1e-3 rad.
+    Otherwise, the returned d is 0 if d is 0 in the reference.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)

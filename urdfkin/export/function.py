@@ -241,7 +241,10 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives with respect to x; if x is a constant, add to the bounds."""
+        """Add `slope` to the derivatives with respect to x.
+
+        If x is a constant, add |slope| * (error of x) to the bounds instead.
+        """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
         elif x in slopes:

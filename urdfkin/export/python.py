@@ -133,7 +133,10 @@ def _array_first_lines(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that stacks numbers, because arrays may be immutable, as in JAX."""
+    """Make a `Dialect.result` that stacks numbers.
+
+    Arrays may be immutable, for example in JAX.
+    """
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function

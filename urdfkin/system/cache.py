@@ -86,8 +86,8 @@ _warned_messages: set[str] = set()
 def _unsafe_reason(folder: Path) -> str | None:
     """Return the reason why another user could have written to a folder, or None.
 
-    The function also checks the parent folders. If a parent folder has no sticky bit, every user who can
-    write to the parent folder can replace the folder.
+    The function also checks the parent folders. Every user who can write to a parent folder can replace
+    `folder`, unless the parent folder has the sticky bit.
     """
     me = os.geteuid()
     for path in (folder, *folder.parents):

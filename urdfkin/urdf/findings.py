@@ -448,7 +448,7 @@ class _FindingGroup:
     """Findings of one code and severity.
 
     Attributes:
-        weighted_findings: At most `MAX_COMPLETE_FINDINGS` pairs: a finding, and the `weight` passed to
+        weighted_findings: At most `MAX_COMPLETE_FINDINGS` pairs (finding, weight). `weight` is an argument of
             `Reporter.add`.
         further_lines: Line numbers of all further findings.
     """

@@ -864,7 +864,10 @@ class _StageReader:
     def _choose_articulation(
         self, articulations: list[_Articulation], articulation: str | None
     ) -> _Articulation:
-        """Return the articulation with a path or name, or all articulations below another prim."""
+        """Return the articulation with the path or name `articulation`.
+
+        If `articulation` is the path of an ancestor, return all articulations below the ancestor as one.
+        """
         if not articulations:
             message = "this stage has no joint between bodies"
             remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"

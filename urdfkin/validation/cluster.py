@@ -261,7 +261,7 @@ class Cluster:
         return future
 
     def _release_robot(self, robot: int) -> None:
-        """If no chunk of the robot is pending, delete its text on the workers."""
+        """If no chunk of the robot is pending, delete the robot's text on the workers."""
         self._pending_counts[robot] -= 1
         if not self._pending_counts[robot]:
             del self._pending_counts[robot]

@@ -380,7 +380,10 @@ def open_store(
 
 
 def _is_store_entry(path: Path) -> bool:
-    """A new store gets its lock before its manifest, so a store without a manifest has only such names."""
+    """Return whether a store without a manifest can contain `path`.
+
+    A new store gets its lock before its manifest.
+    """
     return path.name in (_SCRATCH_FOLDER, _CHUNKS) or path.name.startswith(_LOCK)
 
 

@@ -108,7 +108,7 @@ def compute_magnitudes(
     """Return upper bounds for all frames.
 
     `base` is the result of `BaseMotion.state`: one row for all configurations, or n rows.
-    Without v, only `p` and `roundings` are valid. Without a, the joint accelerations are 0.
+    If `v` is None, only `p` and `roundings` are valid. If `a` is None, the joint accelerations are 0.
     """
     n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))

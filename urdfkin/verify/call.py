@@ -139,7 +139,7 @@ class Call:
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def run_and_locate_error(self, function: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `function`, and name the joint in the error about a non-finite input."""
+        """Call `function`; if an input is not finite, raise an error that names the joint."""
         try:
             return function(*arguments, **options)
         except NotFiniteError:

@@ -70,7 +70,7 @@ def _largest_difference(ours, theirs, scale, i, k):
 
 @inline_function()
 def _has_equal_triples(scale, k):
-    """Return True if scale[k] contains six rows: first three equal rows, then three equal rows."""
+    """Return True if scale[k] has six rows, the first three are equal, and the last three are equal."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):

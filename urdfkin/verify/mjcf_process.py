@@ -65,7 +65,7 @@ def serve() -> None:
 def make_error_answer(error: Exception, what: str) -> dict[str, Any]:
     """Return an answer that describes `error`.
 
-    `what` states the problem if a library, not urdfkin, raised `error`.
+    If `error` is not an `UrdfkinError`, `what` states the problem.
     """
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
@@ -91,7 +91,7 @@ def parse_answers(
     `status` is None if the process exceeded `timeout` (s).
 
     Returns:
-        All answers, and a text on the process's end. The text explains a missing answer.
+        All answers, and a text about the end of the process. The text explains a missing answer.
 
     Raises:
         InputError: An answer is an error.

@@ -63,8 +63,8 @@ class Quantity:
         results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
             the bound. If it is not None, checks call it instead of `ask_oracle` and `scale`.
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
-        recursive: True if one forward recursion computes the result, without further arguments such as
-            `gravity`.
+        recursive: True if one forward recursion computes the result, and `compute` has no further arguments,
+            such as `gravity`.
         in_validation: `validate` compares the quantity if `recursive` and `in_validation` are True. False for
             Hessians, which are nv times larger than Jacobians.
         object_kind: Compared objects: "frames", "joints" or "columns".

@@ -51,7 +51,7 @@ class FrameJacobian:
             None: planar joint, floating joint, or joint that a mimic joint follows.
         active_entries: (6, nv) False for entries that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
-            base. Directions without motion can be different with a moving base.
+            base. A moving base can change the directions without motion.
         moving_base: Whether a base motion is given.
     """
 

@@ -222,7 +222,7 @@ def _cell_mask(reference: DHTable) -> FloatArray:
 def _find_compensated_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Find the cells whose errors a fit hides.
+    """Find the cells with errors that a fit compensates.
 
     Returns:
         Row index and name of each cell.
@@ -282,7 +282,7 @@ def _find_differences_without_fit(
     check_targets: TargetPoses,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
-    """The result is empty if a tip error remains after changes of cells."""
+    """The result is empty if no change of cells removes the tip error."""
     corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > NEGLIGIBLE_ERROR * targets.scale or radians > NEGLIGIBLE_ERROR:

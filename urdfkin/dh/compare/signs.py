@@ -74,8 +74,8 @@ class _PartialAlignment:
         offsets: Joint offsets without the last.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
         delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
-        free_offset: A joint offset that can be chosen freely: index of its row, and 1 or -1.
-            With -1, an increase of this offset rotates the axis x about -z.
+        free_offset: A joint offset that can be chosen freely: index of its row, and the sign 1 or -1.
+            If the sign is -1, an increase of this offset rotates the axis x about -z.
     """
 
     cost: float

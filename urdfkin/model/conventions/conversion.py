@@ -505,7 +505,7 @@ class Conversion:
     def _to_target_rates(
         self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M x + M' v, or M x without v; x is `own_rates`."""
+        """Return M x + M' v for x = `own_rates`; return M x if `v` is None."""
         if self._same_v:
             return own_rates
         rates: FloatArray = own_rates[..., self._v_index]
@@ -849,7 +849,7 @@ def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     """Return indices k for which x_tool[..., k] has the order of urdfkin's q or v.
 
-    A mimic joint is used only if the target program has no coordinate of the mimicked joint.
+    The index of a mimic joint is used only if the mimicked joint has no coordinate in the target program.
     """
     return [
         min(

@@ -149,7 +149,7 @@ class JointMatcher:
     def rank_candidates(
         self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray
     ) -> list[Edge]:
-        """Return the joints of B, most similar to `e` first.
+        """Return the joints of B. The joint most similar to `e` comes first.
 
         X (4, 4) moves B before the comparison. Joints named in `name_map` are omitted.
         """
@@ -431,7 +431,7 @@ def _first_revolute_axes(
 
     A pair is an axis of A and an axis of B.
     Each item is (revolute pair, prismatic pairs before this pair, pairs from `later_axes`).
-    Without a revolute pair, the first entry is the last prismatic pair.
+    If the branches have no revolute pair, the first entry is the last prismatic pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -490,8 +490,8 @@ class _Match:
     """The result of an exact match of two subtrees.
 
     Attributes:
-        X: (4, 4) motion that moves B's body after the joint to A's body after the joint,
-            in the zero configuration.
+        X: (4, 4) motion that moves B's body to A's body, in the zero configuration.
+            Both bodies come after the joint.
     """
 
     X: FloatArray

@@ -879,7 +879,7 @@ class _RulePair:
         slope_b: n
         constant_b: d
         offset: o
-        is_free: Whether o can have any value, because no later link or axis determines o.
+        is_free: True if no later link or axis determines o. Then o can have any value.
         has_effect: Whether the joint moves matched links or later axes.
     """
 

@@ -314,7 +314,7 @@ class Mechanism:
     def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy of the mechanism with the joints `names` in this order.
 
-        `allows_order` must be true. Links with a pose that depends on the order are omitted.
+        `allows_order` must be true. A link is omitted if its pose depends on the order.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -354,7 +354,7 @@ class Mechanism:
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """Yield one iterator for each run of consecutive joints.
 
-        The iterator yields each order of the run's joints that does not change the motion, as joint names.
+        The iterator yields lists of joint names: all orders of the run's joints with the same motion.
         The current order comes first.
         """
         run: list[Edge] = []
@@ -483,8 +483,8 @@ class MatchedJoints:
         axis_a: Screw S; exp(S t) moves the bodies after the joint.
             If A's joint is fixed, `axis_a` is the screw of B's joint.
         axis_b: B's screw S' in A's root frame. If S' = S, `axis_b` is the same object as `axis_a`.
-        tilt: Angle (rad), 0 within the tolerance.
-        shift: Distance (m), 0 within the tolerance.
+        tilt: Angle (rad); 0 if the angle is within the tolerance.
+        shift: Distance (m); 0 if the distance is within the tolerance.
 
             joints                              tilt                        shift
             revolute                            between the axes            between the axes
@@ -755,7 +755,7 @@ class MatchedValues:
 
     @property
     def variable(self) -> str | None:
-        """The variable that moves the joints; None for two different variables."""
+        """The variable that moves the joints; None if different variables move the two joints."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
