@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from tests.pages import DOCS, blocks
@@ -54,3 +55,47 @@ def test_the_library_no_longer_has_the_defect(title: str) -> None:
 
 def test_every_entry_has_a_program() -> None:
     assert len(PROGRAMS) == 11
+
+
+@pytest.mark.parametrize("moving_after", [False, True])
+def test_the_derivative_after_a_mimic_joint_is_wrong_only_where_the_page_says(moving_after: bool) -> None:
+    limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+    third = ("revolute", f'<axis xyz="1 0 0"/>{limit}') if moving_after else ("fixed", "")
+    model = pin.buildModelFromXML(
+        f"""<robot name="r"><link name="base"/><link name="a"/><link name="b"/><link name="tip"/>
+        <joint name="first" type="revolute"><parent link="base"/><child link="a"/>
+        <axis xyz="0 0 1"/>{limit}</joint>
+        <joint name="second" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.5 0 0"/>
+        <axis xyz="0 1 0"/>{limit}<mimic joint="first" multiplier="2"/></joint>
+        <joint name="third" type="{third[0]}"><parent link="b"/><child link="tip"/>
+        <origin xyz="0.2 0.1 0" rpy="0.3 0 0"/>{third[1]}</joint></robot>""",
+        mimic=True,
+    )
+    data, h = model.createData(), 1e-6
+    q, v = np.linspace(0.3, 0.5, model.nq), np.linspace(0.7, -0.4, model.nv)
+    references = pin.LOCAL, pin.WORLD, pin.LOCAL_WORLD_ALIGNED
+
+    def error(name: str, reference: pin.ReferenceFrame, *, of_frame: bool) -> float:
+        index = model.getFrameId(name) if of_frame else model.getJointId(name)
+        get = pin.getFrameJacobian if of_frame else pin.getJointJacobian
+        rate = pin.getFrameJacobianTimeVariation if of_frame else pin.getJointJacobianTimeVariation
+
+        def jacobian(q: np.ndarray) -> np.ndarray:
+            pin.computeJointJacobians(model, data, q)
+            pin.updateFramePlacements(model, data)
+            return np.array(get(model, data, index, reference))
+
+        expected = (jacobian(q + h * v) - jacobian(q - h * v)) / (2.0 * h)
+        pin.computeJointJacobiansTimeVariation(model, data, q, v)
+        pin.updateFramePlacements(model, data)
+        return float(np.abs(rate(model, data, index, reference) - expected).max())
+
+    wrong = {
+        (name, reference)
+        for name in ("second", "tip")
+        for reference in references
+        if error(name, reference, of_frame=True) > 1e-3
+    }
+    aligned = {("second", pin.LOCAL_WORLD_ALIGNED), ("tip", pin.LOCAL_WORLD_ALIGNED)}
+    assert wrong == (aligned | {("tip", pin.LOCAL)} if moving_after else aligned)
+    assert all(error("second", reference, of_frame=False) < 1e-7 for reference in references)
