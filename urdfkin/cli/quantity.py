@@ -283,8 +283,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
-    For a Hessian, each row has the derivative of one column of the Jacobian with respect to one joint
-    coordinate. Rows of a Hessian that contain only rounding errors are left out.
+    For a Hessian, each row contains the derivative of one Jacobian column by one joint coordinate.
+    Rows of a Hessian that contain only rounding errors are left out.
     """
     import numpy as np
 

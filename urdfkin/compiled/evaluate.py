@@ -180,7 +180,11 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Return None if a kernel must compute the batch; else 1 for nan, inf or too large inputs, or 0."""
+    """Compute a batch without a kernel.
+
+    Return None if a kernel must compute the batch. Otherwise, return 1 if an input is nan, inf or too
+    large, and 0 if not.
+    """
     if preload.get_kernel(name) is not None:
         return None
     if threads is not None:

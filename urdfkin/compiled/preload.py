@@ -186,7 +186,7 @@ def _close_stdin(process: subprocess.Popen[bytes]) -> None:
 
 
 def _close_inherited_inputs() -> None:
-    """Close a forked child's copy of the pipe, so that the second process ends with its own parent."""
+    """Close a forked child's copy of the pipe, so that the second process ends when its parent ends."""
     for process in _background.values():
         process.returncode = 0
         _close_stdin(process)

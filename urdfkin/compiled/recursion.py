@@ -321,7 +321,7 @@ def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row
     """Read whole blocks of eight numbers, which is faster.
 
     For example, if nq is 6, the function may read eight numbers. The two additional numbers go to the
-    scratch rows of v. If the recursion needs these rows, v overwrites the two numbers.
+    scratch rows of v. If the recursion needs v, the values of v overwrite the two additional numbers.
     """
     for i in range(begin, end):
         at = blocks[i]

@@ -189,7 +189,8 @@ def _make_input_check(
     """Return code of the function `_demand`.
 
     `wrong_type` and `is_array` are Python expressions. `wrong_type` is true for numbers of a wrong type.
-    `is_array` tests whether the input `x` is an array. If `is_array` is empty, `_demand` omits this test.
+    `is_array` tests whether the input `x` is an array. If `is_array` is empty, `_demand` does not test
+    whether `x` is an array.
     `parameters` contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""

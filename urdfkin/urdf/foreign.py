@@ -211,8 +211,7 @@ class _ModelReader:
     def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
         """For each body with the frame of a joint, yield the index of the joint and of the body.
 
-        The bodies are in reverse order. In a dictionary of the pairs, the first body of a joint therefore
-        replaces the later bodies of the joint.
+        The bodies are in reverse order, so a dictionary of the pairs keeps the first body of each joint.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():

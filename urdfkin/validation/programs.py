@@ -140,8 +140,8 @@ class Program:
         """Return the program's result for one configuration.
 
         Raises:
-            ProgramError: the program ended, took too long, or answered with an error or without a result; or
-                it failed for the three preceding configurations.
+            ProgramError: the program ended, took too long, or answered with an error or without a result.
+                Also raised, without a call, if the program failed for the three preceding configurations.
             SourceError: the program cannot be started again.
         """
         if self._failures >= _MAX_FAILURES:

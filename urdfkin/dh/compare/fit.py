@@ -284,8 +284,8 @@ def _sparse_changes(
 ) -> FloatArray:
     """Return changes of cells that remove the tip error.
 
-    As few cells as possible then differ from `start`. A cell is not changed if changes of the free
-    parameters have the same effect on the tip.
+    The changed table differs from `start` in as few cells as possible. A cell is not changed if
+    changes of the free parameters have the same effect on the tip.
     """
     Q = _orthonormal_basis(free_derivatives)
     remaining = cell_derivatives - Q @ (Q.T @ cell_derivatives)

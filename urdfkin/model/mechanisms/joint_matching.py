@@ -362,8 +362,8 @@ def root_poses_by_siblings(
 ) -> Iterator[FloatArray]:
     """Yield poses of B's root that align up to three joint axes of one body.
 
-    If these axes do not determine the shift along the first axis, later axes determine this shift.
-    If no later axis determines this shift, the shift is 0.
+    If the aligned axes do not determine the shift along the first axis, later axes determine the shift.
+    If no later axis determines the shift, the shift is 0.
     """
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
