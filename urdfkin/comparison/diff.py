@@ -121,7 +121,8 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes. Versions of the same format: first the robot's name, then joints, then links.
+        changes: The changes. If both versions have the same format: first a change of the robot's name, then
+            changes of joints, then changes of links.
         effects: One entry for each joint or link whose changes move links. Each entry is the effect if all
             other joints are unchanged. Without an entry: a joint that moves no frame, and a joint whose
             effect cannot be computed, such as a new joint.

@@ -149,8 +149,8 @@ def make_dh_table(
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
-        InputError: an option is invalid or excluded by `like`, `like` describes a different robot, or a joint
-            is planar or floating.
+        InputError: an option is invalid, or is not allowed with `like`; `like` describes another robot; or a
+            joint is planar or floating.
         RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
     """
     exact = make_chain(tree, tip, base)

@@ -128,9 +128,9 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the joint ranges within the limits of mimic joints.
+    """Return the range of each joint, reduced by the limits of the joints that mimic it.
 
-    If mimic joints allow at most one value, the mimicked joint has its own range.
+    If these limits allow at most one value, the range is not reduced.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}

@@ -630,7 +630,7 @@ def _check_columns(
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.
 #: Rotations by 130 and by -230 degrees lead to the same pose.
-#: For an angle above 120 degrees, the rotation in the other direction is less than twice as large.
+#: Above 120 degrees, the larger of the two rotations is less than twice as large as the smaller one.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error.

@@ -520,7 +520,7 @@ class _Run:
         return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Convert the scale of a bound to the function's convention.
+        """Convert the scale of a bound from urdfkin's convention to the convention of the user's function.
 
         Jacobians, after the rows are reordered:
 

@@ -148,7 +148,8 @@ class TableComparison:
         unfitted_differences: Cells that must change so that the unfitted table agrees.
             Empty if `is_fitted` is false, or if `mistakes` is not empty.
             Empty if a tip error remains, or if more than len(differences) + 2 cells must change.
-        not_compared: Row index and name of each cell whose error a fit compensates.
+        not_compared: Row index and name of each cell that a fit cannot check, because a change of base, tool
+            or joint offsets has the same effect.
         residual: Tip error after cell corrections, m.
     """
 

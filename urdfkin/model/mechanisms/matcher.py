@@ -77,10 +77,10 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the number of comparisons of later joints, shared by several matchers.
+    """The number of comparisons that remain for decisions between equally good choices at a joint.
 
-    If several choices at a joint are equally good, later joints decide. Each comparison takes one joint of
-    A and one joint of B.
+    To decide, a matcher compares joints of A with joints of B, farther along the two trees. Several matchers
+    can share this number.
 
     Attributes:
         remaining: Number of joint pairs that may still be compared.

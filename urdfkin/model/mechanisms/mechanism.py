@@ -549,7 +549,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def move_difference_to_tool(self) -> FramePair:
-        """Return a copy with the frames' difference in `tool`.
+        """Return a copy in which `tool` contains the difference of the two frames.
 
         In the copy, `constant_motion` is the identity, and `tilt` and `shift` are 0.
         """
