@@ -311,7 +311,7 @@ def test_each_class_with_a_bound_documents_the_assumed_travel(documented: object
 
 @pytest.mark.parametrize("page", ["same.md", "dh.md", "dh-at-work.md"])
 def test_each_page_about_bounds_states_the_assumed_travel(page: str) -> None:
-    text = (Path(__file__).parents[2] / "docs" / page).read_text(encoding="utf-8")
+    text = " ".join((Path(__file__).parents[2] / "docs" / page).read_text(encoding="utf-8").split())
     limit = f"{ASSUMED_LIMIT:g} m"
     assert re.search(rf"\b(at most|within|between -{limit} and) {limit}\b", text)
 
