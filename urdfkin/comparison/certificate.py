@@ -491,7 +491,7 @@ def _interval_errors(
     *,
     use_branch_and_bound: bool,
 ) -> Iterator[str]:
-    """Yield an error for each wrong or unproven bound; `rounding` is (m, rad)."""
+    """Yield an error for each wrong or unproven bound; `rounding` is a distance (m) and an angle (rad)."""
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)

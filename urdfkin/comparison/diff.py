@@ -129,8 +129,8 @@ class Changes:
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
-            does not list these errors. None for versions of the same format, and if the verdict of `same` is
-            not `UP_TO_SINGLE`. Infinite if the bound was not computed.
+            does not list these errors. None if both versions have the same format, or if the verdict of
+            `same` is not `UP_TO_SINGLE`. Infinite if the bound was not computed.
     """
 
     sources: tuple[str, str]

@@ -1704,7 +1704,7 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # A plain str with the default reference is its own key.
-        # The key then contains no `Reference`: the hash of an enumeration member is slow.
+        # This key contains no `Reference`, because the hash of an enumeration member is slow.
         # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
         # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str

@@ -113,7 +113,7 @@ def worst_disagreements(
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If `scale_rows` has fewer than n rows, the kernel uses these arrays as working memory.
+        # If `scale_rows` has fewer than n rows, the kernel uses `unit`, `units` and `bits` as working memory.
         if len(scale_rows) < n:
             unit, units, out_bits = np.empty(scale_rows.size), np.zeros(width), worst.view(np.int64)
             bits = units.view(np.int64)

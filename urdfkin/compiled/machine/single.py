@@ -225,9 +225,10 @@ def array_layout_is_known() -> bool:
 
 
 #: Four items for each quantity:
-#: kernel for WORLD and LOCAL_WORLD_ALIGNED, kernel for LOCAL,
-#: number of inputs (1 for q, 2 for q and v, 3 for q, v and a),
-#: number of axes of length nv (1 for a Jacobian, 2 for a Hessian).
+#: - the kernel that computes the quantity in WORLD and LOCAL_WORLD_ALIGNED,
+#: - the kernel that computes the quantity in LOCAL,
+#: - the number of inputs (1 for q, 2 for q and v, 3 for q, v and a),
+#: - the number of axes of length nv (1 for a Jacobian, 2 for a Hessian).
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),

@@ -31,8 +31,8 @@ differs from S. The link poses of A and B are then
 Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i, then
 S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all joints and links, the two models have
 the same motion. If A and B differ at a joint or link, the motions of the two models usually differ. There are
-exceptions. For example, two consecutive revolute joints with the same line as axis move the later links by
-the sum of the two angles.
+exceptions. For example, two consecutive revolute joints may rotate about the same line. The later links then
+depend only on the sum of the two angles.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is slope * variable + constant. The sign and the zero offset of the joint

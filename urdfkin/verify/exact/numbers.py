@@ -33,7 +33,7 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Number of decimal digits for a path without joints: twice the 15 decimal digits of a double.
+#: Number of decimal digits for a path without joints. A double has 15 decimal digits.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
