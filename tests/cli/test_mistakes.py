@@ -48,7 +48,7 @@ MISTAKES = {
     "fk panda": "unknown command 'fk'; did you mean placement?",
     "jacobian_rate panda": "'jacobian_rate'; did you mean jacobian-rate?",
     "ik panda": "unknown command 'ik'; urdfkin has no inverse kinematics",
-    "compare a b": "did you mean report compare (for reports), same (for models)",
+    "compare a b": "did you mean `report compare` (reports), `same` (models) or `diff` (versions",
     "jacobian panda --fram x": "No such option",
     "jacobian panda --reference global": "Invalid value for '--reference'",
     "jacobian panda --format xml": "Invalid value for '--format'",

@@ -133,7 +133,7 @@ _SYNONYMS = _invert_table(
         "screws": "poe product-of-exponentials twists",
         "info": "show joints links frames limits summary tree",
         "view": "visualize visualise viewer display gui",
-        "report compare (for reports), same (for models) or diff (for file versions)": "compare comparison",
+        "`report compare` (reports), `same` (models) or `diff` (versions of a file)": "compare comparison",
         "report status": "campaign status progress",
         "report merge": "merge",
         "check": "lint validate-urdf check-urdf",
