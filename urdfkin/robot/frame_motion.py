@@ -22,7 +22,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import Trajectory
 from urdfkin.verify.bounds import broadcast_k, find_active_entries
 from urdfkin.verify.call import Call
-from urdfkin.verify.comparison import worst_disagreements
+from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 from urdfkin.verify.quantities import (
     ACCELERATION,
     JACOBIAN,
@@ -213,4 +213,4 @@ def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> MotionC
     )
     units = worst_disagreements(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(broadcast_k(bound, units.shape), units.shape)
-    return MotionCheck(units[:, 0], (units / k)[:, 0], k[:, 0])
+    return MotionCheck(units[:, 0], bound_ratios(units, k)[:, 0], k[:, 0])

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, broadcast_k
-from urdfkin.verify.comparison import worst_disagreements
+from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 
 #: The libraries of a cross check, in the order of columns.
 CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
@@ -115,14 +115,9 @@ def make_cross_check(
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
     units = worst_disagreements(one, other, bound.scale, 2)
-    bound_ratio = _nan_as_infinity(units / broadcast_k(bound, units.shape))
+    bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))
     agrees = bound_ratio <= 1.0
     return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(bound_ratio.max()))
-
-
-def _nan_as_infinity(ratios: FloatArray) -> FloatArray:
-    # A ratio is NaN if the bound is invalid: no result is within such a bound.
-    return np.where(np.isnan(ratios), np.inf, ratios)
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
@@ -243,7 +238,7 @@ def compute_error_stats(
             n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None
         )
     units = worst_disagreements(results, oracle_results, bound.scale, 2)
-    bound_ratio = _nan_as_infinity(units / broadcast_k(bound, units.shape))
+    bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))
     k, f = divmod(int(bound_ratio.argmax()), count)
     q, v, a = inputs[k]
     case = WorstCase(

@@ -30,7 +30,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import as_json_data
 from urdfkin.validation.diagnosis import DiagnosisCase, Mistakes, as_tuple, diagnose
 from urdfkin.verify.bounds import broadcast_k
-from urdfkin.verify.comparison import disagreement
+from urdfkin.verify.comparison import bound_ratios, disagreement
 from urdfkin.verify.oracles import package_versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.quantities import find_quantity as quantity_of
@@ -365,9 +365,8 @@ class _FunctionResults:
     oracle_results: FloatArray | None
 
     def bound_ratios(self, other: FloatArray) -> FloatArray:
-        # k is NaN if the bound is invalid: no result is within such a bound.
         k = self.k.reshape(-1, *[1] * (self.actual.ndim - 1))
-        return np.where(np.isnan(k), np.inf, self.units(other) / k)
+        return bound_ratios(self.units(other), k)
 
     def units(self, other: FloatArray) -> FloatArray:
         return disagreement(self.actual, other, self.scale)

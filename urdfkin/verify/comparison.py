@@ -70,11 +70,16 @@ def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
     """
     if not units.size:
         return BatchComparison()
-    bound_ratio = units / broadcast_k(bound, units.shape)
+    bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))
     index = np.unravel_index(int(bound_ratio.argmax()), bound_ratio.shape)
     return BatchComparison(
         units.size, float(units.max()), float(bound_ratio.max()), tuple(int(i) for i in index)
     )
+
+
+def bound_ratios(units: FloatArray, k: FloatArray) -> FloatArray:
+    """Divide differences in multiples of eps * scale by k; inf if the bound is invalid (k is NaN)."""
+    return np.where(np.isnan(k), np.inf, units / k)
 
 
 @np.errstate(all="ignore")

@@ -38,7 +38,7 @@ from urdfkin.verify.bounds import (
     mjcf_placement_bound,
     mujoco_magnitudes,
 )
-from urdfkin.verify.comparison import worst_disagreements
+from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 from urdfkin.verify.mjcf_process import MAX_OUTPUT_BYTES, parse_answers, unpack_array
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
@@ -211,8 +211,7 @@ def _unpack_placements(found: Mapping[str, Any]) -> FloatArray:
 
 def _compute_bound_ratios(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
     units = worst_disagreements(ours, theirs, bound.scale, 2)
-    ratio: FloatArray = units / broadcast_k(bound, units.shape)
-    return ratio
+    return bound_ratios(units, broadcast_k(bound, units.shape))
 
 
 def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound) -> str:

@@ -106,7 +106,7 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     for k, (quantity, check) in enumerate(x.checks.items()):
         axes.plot(t, check.units, label=quantity, **_line_style(k))
         axes.plot(t, check.bound, linewidth=0.6, **_line_style(k))
-        outside = ~(check.bound_ratio <= 1.0)
+        outside = check.bound_ratio > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The plot's vertical axis is logarithmic.
