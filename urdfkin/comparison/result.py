@@ -653,14 +653,11 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
         raise InputError(f"a joint of {which} occurs twice", where="map", found=repr(double))
 
 
-def changes_of_b(
-    alignment: Alignment, rounding: Tolerance, *, has_table: bool = False
-) -> tuple[tuple[str, str], ...]:
+def changes_of_b(alignment: Alignment, rounding: Tolerance) -> tuple[tuple[str, str], ...]:
     """Return the changes that bring B closest to A.
 
-    The function stores the tool poses in `alignment`. With `has_table` (A or B is a Denavit-Hartenberg
-    table), every displaced frame is reported as a tool. The frames of a Denavit-Hartenberg table depend on
-    the table's convention.
+    The function stores the tool poses in `alignment`. If A or B is a Denavit-Hartenberg table, every
+    displaced frame is reported as a tool, because the frames of a table depend on the table's convention.
 
     Returns:
         (kind, text) of each change.
@@ -696,14 +693,16 @@ def changes_of_b(
             words = f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}"
             lines += [("zeros", words)] if step.offset else []
             lines += [("senses", words)] if step.sense < 0 else []
-    return (*lines, *_tool_changes(alignment, rounding, has_table=has_table))
+    return (*lines, *_tool_changes(alignment, rounding))
 
 
-def _tool_changes(alignment: Alignment, rounding: Tolerance, *, has_table: bool) -> Iterator[tuple[str, str]]:
+def _tool_changes(alignment: Alignment, rounding: Tolerance) -> Iterator[tuple[str, str]]:
     supports, links = _support_link_pairs(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
         is_support = (frame.a, frame.b) in supports
-        if frame.differs and (is_support or has_table or _are_fixed_end_links(alignment, frame)):
+        if frame.differs and (
+            is_support or alignment.has_free_frames or _are_fixed_end_links(alignment, frame)
+        ):
             alignment.frames[k] = frame.move_difference_to_tool()
             if is_support and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])

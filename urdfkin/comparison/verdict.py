@@ -188,7 +188,6 @@ class Comparator:
                     remedy="write origins in metres",
                 )
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
-        self.has_table = any(is_table)
 
     def compare(self) -> Sameness:
         alignment = self.alignment()
@@ -220,7 +219,7 @@ class Comparator:
         """Return the result without intervals; store the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
-        changes = changes_of_b(alignment, self.tolerance, has_table=self.has_table)
+        changes = changes_of_b(alignment, self.tolerance)
         kinds = {kind for kind, _ in changes}
         different = differences(alignment, variables)
         single = self._single_precision_bound(alignment, variables)
@@ -333,7 +332,7 @@ class Comparator:
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
         # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
         # Therefore, a comparison with a table uses only links with equal names in A and B.
-        return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
+        return [(a, b) for a, b in pairs if not alignment.has_free_frames or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
         names = alignment.names

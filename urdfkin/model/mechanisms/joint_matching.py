@@ -314,8 +314,9 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
             yield candidate
 
 
-#: Two axes are nearly parallel if the sine of their angle is smaller than this.
-NEARLY_PARALLEL = 1e-2
+#: Below this sine of the angle between two axes, an error of one axis moves the nearest points of the axes by
+#: more than 100 times the error.
+_NEARLY_PARALLEL_SINE = 1e-2
 
 
 def later_axes(
@@ -330,7 +331,7 @@ def later_axes(
         axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction)) < NEARLY_PARALLEL:
+        if np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction)) < _NEARLY_PARALLEL_SINE:
             next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
             yield from later_axes(
                 mechanisms, (e, f), next_bodies, screws if axes[0].turns else reference_line

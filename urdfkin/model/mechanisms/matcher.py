@@ -679,7 +679,7 @@ def _best_of(
 
 def _is_better_alignment(one: Alignment, than: Alignment) -> bool:
     # The frames of a table are free, so its links decide only between alignments with equal joints.
-    if (one.a.free_frames or one.b.free_frames) and one.all_joints_agree != than.all_joints_agree:
+    if one.has_free_frames and one.all_joints_agree != than.all_joints_agree:
         return one.all_joints_agree
     return is_better(one.score, than.score)
 
@@ -817,7 +817,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """If all axes differ slightly, no axes agree within the normal tolerance."""
-    if best.all_joints_agree and (best.a.free_frames or best.b.free_frames):
+    if best.all_joints_agree and best.has_free_frames:
         return best
     a, b, (least, most), look_ahead = (
         best.a,

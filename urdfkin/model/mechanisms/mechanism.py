@@ -591,6 +591,11 @@ class Alignment:
         return alike and not (self.max_difference or self.only_a or self.only_b)
 
     @property
+    def has_free_frames(self) -> bool:
+        """Whether A or B is made of a Denavit-Hartenberg table, so that its frames follow a convention."""
+        return self.a.free_frames or self.b.free_frames
+
+    @property
     def all_joints_agree(self) -> bool:
         """Whether all joints are matched, and all matched joints agree."""
         return not (
