@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from tests.calibration.arms import BRANCHED
+from urdfkin.calibration.calibrate import calibrate
 from urdfkin.calibration.parameters import CalibrationModel, make_table_model, make_urdf_model
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
+from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
@@ -156,3 +158,9 @@ def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fif
     np.testing.assert_allclose(poses, dh.placement(q), atol=1e-14)
     difference = np.abs(columns[0] - quotients(model, place))
     assert difference.max() < model.chain.rounding_bound(values)
+
+
+@pytest.mark.parametrize("frames", [{"tip": "three"}, {"base": "three"}])
+def test_a_table_with_another_tip_or_base_is_refused(frames: dict[str, str]) -> None:
+    with pytest.raises(InputError, match="a table is fitted from its base to its tip"):
+        calibrate(table(DHConvention.STANDARD), **frames)

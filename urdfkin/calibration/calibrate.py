@@ -254,8 +254,8 @@ def calibrate(
         poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m. If `fit` contains
             "base", the poses are in the instrument's frame. If `fit` contains "tool", they are poses of the
             target.
-        tip: Name of a link or joint; the robot's tip when None. Without effect for a table.
-        base: Name of a link or joint; the robot's base frame when None. Without effect for a table.
+        tip: Name of a link or joint; the robot's tip when None. None for a table.
+        base: Name of a link or joint; the robot's base frame when None. None for a table.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
             six numbers of each joint origin, or the cells of a table. A table's row has the cell beta only if
@@ -273,7 +273,7 @@ def calibrate(
 
     Raises:
         InputError: an array has a wrong shape, a number is not finite, there are no poses, or the positions
-            are not in metres.
+            are not in metres. `source` is a table, and `tip` or `base` is not None.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
@@ -328,16 +328,18 @@ def fit_model(
     """
     robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
-    model = (
-        make_table_model(source, names)
-        if isinstance(source, DHTable)
-        else make_urdf_model(
-            robot.tree,
-            as_choice(tip, robot.tip_frame, "tip"),
-            as_choice(base, robot.base_frame, "base"),
-            names,
-        )
-    )
+    if isinstance(source, DHTable):
+        if tip is not None or base is not None:
+            raise InputError(
+                "a table is fitted from its base to its tip",
+                where="tip" if tip is not None else "base",
+                found=safe_repr(tip if tip is not None else base),
+                remedy="leave out the tip and the base, or remove rows from the table",
+            )
+        model = make_table_model(source, names)
+    else:
+        tip, base = as_choice(tip, robot.tip_frame, "tip"), as_choice(base, robot.base_frame, "base")
+        model = make_urdf_model(robot.tree, tip, base, names)
     drop_outliers, full_poses = as_bool(drop_outliers, "drop_outliers"), as_bool(full_poses, "full_poses")
     if (q is None) != (poses is None):
         raise InputError("`q` and `poses` must be given together", found="only one of the two")
