@@ -130,4 +130,5 @@ def test_a_name_in_a_comment_cannot_end_the_comment(name: str) -> None:
         assert not set("*\"'\\%\n") & set(text)
         assert len(text) < 100
     assert function_prefix(name, name)[0].isalpha()
+    assert len(f"{function_prefix(name * 50, f'x{name}' * 50)}_kinematics") <= 63  # the limit of MATLAB
     assert re.fullmatch(r"\w+", safe_name(name), re.ASCII)

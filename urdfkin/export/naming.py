@@ -13,6 +13,8 @@ from urdfkin.dh.export.code import sanitize
 
 #: Maximum length of a name before a prefix and a number are added; MATLAB allows 63 characters in all.
 _MAX_LENGTH = 40
+#: Maximum length of a prefix; the exported code appends at most 11 characters to it: `_kinematics`.
+_MAX_PREFIX_LENGTH = 52
 _MAX_COMMENT_LENGTH = 80
 
 
@@ -48,7 +50,8 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 def function_prefix(robot: str, frame: str) -> str:
     """Return the prefix of a frame's exported functions.
 
-    The prefix begins with a letter.
+    The prefix begins with a letter and has at most 52 characters. If both names together are longer, the
+    prefix contains only the name of the frame.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')
@@ -57,6 +60,8 @@ def function_prefix(robot: str, frame: str) -> str:
     """
     first, second = safe_name(robot) if robot else "", safe_name(frame)
     word = second if second.startswith(first) else f"{first}_{second}"
+    if len(word) > _MAX_PREFIX_LENGTH:
+        word = second
     return word if word[0].isalpha() else f"robot_{word}"
 
 
