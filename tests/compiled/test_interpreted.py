@@ -17,7 +17,7 @@ from scripts.check_bits import MODES, RobotInputs, find_interpreted_differences,
 from tests.cli.running import imported, process, python
 from urdfkin.compiled import preload
 from urdfkin.compiled.preload import use_only
-from urdfkin.compiled.python_numbers import Number, fma, sine_cosine
+from urdfkin.compiled.python_numbers import Number, fma, one, sine_cosine, zero
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
@@ -55,6 +55,11 @@ def test_results_with_a_moving_base_a_free_root_and_an_imu_are_bitwise_equal(roo
         results = in_both_ways(lambda r=reference: robot.acceleration(q, v, a, "tool0", r, base=base))  # type: ignore[misc]
         assert have_equal_bits(*results)
     assert have_equal_bits(*in_both_ways(lambda: robot.imu(q, v, a, "tool0", base=base)))
+
+
+def test_the_negative_of_one_is_minus_one() -> None:
+    assert (-one()).x == -1.0
+    assert -zero() is zero()
 
 
 def test_the_sine_is_bitwise_equal_to_the_kernels_for_angles_of_every_size() -> None:

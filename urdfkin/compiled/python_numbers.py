@@ -175,8 +175,8 @@ class ConstantNumber:
     def __rsub__(self, other: int) -> Any:
         return other if self.value == 0 else Number(float(other)) - self
 
-    def __neg__(self) -> ConstantNumber:
-        return self  # No equation negates 1.
+    def __neg__(self) -> Any:
+        return Number(-1.0) if self.value else self
 
 
 def _double(x: Any) -> float:
