@@ -139,7 +139,7 @@ def test_the_texts_about_validation_list_the_quantities_of_the_table() -> None:
     assert format_unvalidated_titles() in plain((ROOT / "docs/known-limits.md").read_text("utf-8"))
     named = [row for row in QUANTITIES.values() if row.object_kind == "frames"]
     assert {row.title for row in named} == {
-        *re.split(", | and ", f"{format_validated_titles()}, {format_unvalidated_titles()}")
+        *re.split(", and |, ", f"{format_validated_titles()}, {format_unvalidated_titles()}")
     }
 
 

@@ -360,7 +360,7 @@ def format_unvalidated_titles() -> str:
 
 
 def _join_titles(titles: Sequence[str]) -> str:
-    return f"{', '.join(titles[:-1])} and {titles[-1]}"
+    return f"{', '.join(titles[:-1])}, and {titles[-1]}"
 
 
 def quantities_by_command() -> dict[str, Quantity]:
