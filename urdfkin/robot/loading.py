@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Findings that help only the author of a URDF file.
-#: A URDF that urdfkin generated causes no such warnings.
+#: Warnings that help only the author of a URDF file.
+#: urdfkin does not show these warnings for a URDF that urdfkin generated.
 _FINDINGS_FOR_AUTHORS = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 

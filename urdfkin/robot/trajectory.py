@@ -228,8 +228,7 @@ def make_line_trajectory(
             step[to] = q_1[at] - q_0[at]
     # The velocity v is s' * step, and the acceleration a is s'' * step.
     # Here s' and s'' are the first and the second time derivative of s.
-    # The same formulas hold for planar and floating joints.
-    # `step` is the joint's constant twist in the moving frame.
+    # For a planar or floating joint, `step` is a constant twist in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -248,10 +247,10 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. If the file has no a, or neither v nor a, urdfkin computes
-    the missing arrays by central differences. Before v is computed, the angles of continuous, planar and
-    floating joints are unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report
-    these computations.
+    Without t, the samples are one second apart. If a is missing, urdfkin computes a by central differences.
+    If v is missing too, urdfkin also computes v, after unwrapping the angles of continuous, planar and
+    floating joints. The attributes `rates_source`, `errors` and `notes` of the result report these
+    computations.
 
     Args:
         robot: The robot.
@@ -281,7 +280,7 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
-    """Read a file's samples like `read_trajectory`; a missing array t, v or a stays None."""
+    """Read the samples of a file; a missing t, v or a becomes None."""
     archive = path.suffix.lower() == ".npz"
     data = _read_npz(path, conversion or robot) if archive else _read_table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")

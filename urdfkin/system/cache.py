@@ -36,7 +36,7 @@ _MAX_UNUSED_SECONDS = 30 * 24 * 3600.0
 #: The modification time of this file is the folder's last use.
 _LAST_USE_FILE = ".used"
 #: Other users that may own parent folders: root (0) and 65534.
-#: In a container, 65534 is the host's root.
+#: In a container, folders of the host's root can belong to user 65534.
 _TRUSTED_OWNERS = (0, 65534)
 
 

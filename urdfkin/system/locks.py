@@ -38,8 +38,8 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # If another thread registered `_before_fork` during this fork, `_acquired_locks` has no entry for this
-    # thread.
+    # Another thread can register `_before_fork` during this fork. Then `_acquired_locks` has no entry for the
+    # forking thread.
     for lock in reversed(_acquired_locks.pop(threading.get_ident(), [])):
         lock.release()
 

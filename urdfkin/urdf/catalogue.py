@@ -7,10 +7,10 @@ robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`
 The function `find_package` searches for the folder of a package `name` in this order, and returns the first
 folder that exists:
 
-1. The environment variable `ROS_PACKAGE_PATH` lists folders. In each folder `src` of this list, urdfkin
-   searches for `src/name`, then for each `src/*/name`. If `src` is called `name`, urdfkin first tries `src`.
-2. The environment variable `AMENT_PREFIX_PATH` lists folders. In each folder `prefix` of this list, urdfkin
-   searches for `prefix/share/name`.
+1. The environment variable `ROS_PACKAGE_PATH` lists folders. For each folder F of this list, urdfkin tries
+   F itself, `F/name`, and then each `F/*/name`. F itself counts only if it is called `name`.
+2. The environment variable `AMENT_PREFIX_PATH` lists folders. For each folder F of this list, urdfkin tries
+   `F/share/name`.
 3. In each parent folder of `referring_file`, from the nearest folder to `/`, urdfkin searches for the
    subfolder `name`. A parent folder is the package itself if the folder is called `name`, or if it contains
    the `package.xml` of the package `name`. In this case, urdfkin first tries the parent folder.

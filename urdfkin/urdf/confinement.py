@@ -2,8 +2,8 @@
 
 The operating system limits the memory and time of the process, and prevents the process from writing files
 and from starting other processes. Python raises an audit event for each opened file, new process, socket and
-import. An audit hook refuses all events except the allowed events. The process cannot remove the limits or
-the hook. A xacro file that controls the Python interpreter could circumvent the hook, but not the limits.
+import. An audit hook refuses all events except the allowed events. The hook and the limits remain until the
+process ends. A xacro file that controls the Python interpreter could circumvent the hook, but not the limits.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
@@ -62,8 +62,8 @@ class AllowedPaths:
         """Return the paths that urdfkin may read to load the robot file `path`.
 
         `roots` contains the folder, the ROS package and the git repository of the file. `roots` also contains
-        the folders in `package_paths`, and the files and folders that `arguments` names. The home folder
-        and `/` do not count as package, repository or argument.
+        the folders in `package_paths` and the existing paths in `arguments`. The home folder and `/` do not
+        count as package, repository or argument.
         """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for file_name in ("package.xml", ".git"):

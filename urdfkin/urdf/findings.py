@@ -169,17 +169,16 @@ class Finding:
         message: The problem in one clause, without a full stop.
         found: The wrong text or value, for example `xyz="0 0 0"`, or None.
         remedy: The remedy, or None.
-        file: The path of the file, or a name such as `<text>` or `<stdin>`. After the path of a xacro file
-            follows ` (expanded)`.
+        file: The path of the file, or a name such as `<text>` or `<stdin>`. The path of a xacro file ends
+            with ` (expanded)`.
         line: Line number, from 1.
         column: Column number in characters, from 1.
-        element: The tag of the element with the problem: usually the child of `<robot>`, such as `joint`; a
-            tag of MJCF; or `prim` for USD. None for the whole file.
-        name: The name of this element, the path of the prim, or None.
+        element: The tag of the element with the problem, such as `joint` in URDF or `prim` in USD. In URDF,
+            it is usually a child of `<robot>`. None for the whole file.
+        name: The name of the element with the problem, or None. In USD, the path of the prim.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
-        other_lines: Line numbers of other findings with the same code. This finding represents the other
-            findings.
+        other_lines: Line numbers of more findings with the same code. This object also represents them.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -652,7 +651,7 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Beginning of an attribute value with a tab, line end or reference such as `&amp;`.
+#: Matches an attribute value up to its first tab, line end or reference such as `&amp;`.
 #: Possessive quantifiers keep the matching time linear.
 _REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 

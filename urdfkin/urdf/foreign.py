@@ -66,9 +66,9 @@ def convert_to_urdf(source: Any) -> tuple[str, str] | None:
 
 
 def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a note if a joint of a yourdfpy robot has an origin without rotation, otherwise ().
+    """Return a note about the joints of a yourdfpy robot that have an origin without rotation.
 
-    yourdfpy (0.0.60) ignores quat_xyzw, so the rotation in the file may be lost.
+    yourdfpy (0.0.60) ignores quat_xyzw, so such a joint may have lost the rotation in the file.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -163,10 +163,8 @@ class ConvertedModel:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: Maps the name of a link to the index of a Pinocchio joint. The frame of the joint is the frame
-            of the link.
-        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame. This
-            frame is the frame of the link.
+        joints: Maps the name of a link to the index of a Pinocchio joint. Link and joint have the same frame.
+        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame.
     """
 
     tree: KinematicTree

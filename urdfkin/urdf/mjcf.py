@@ -7,8 +7,8 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 - MuJoCo applies the joints of a body in sequence. Joint k has the anchor p_k and the motion J_k. Joint k
   changes the pose F of the body to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body
   with several joints becomes a chain of joints and links. The last link of the chain is the body.
-- The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
-  MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
+- A joint has the same value in urdfkin's q and in MuJoCo's qpos, because the joint origin includes MuJoCo's
+  reference value (`ref`). Only quaternions differ: MuJoCo stores the scalar part first.
 
 `Mjcf.remarks` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
@@ -118,7 +118,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        If there is a fused model, its placements replace those of `model` for the frames that it contains.
+        The placements of frames in `fused_model` are computed with `fused_model`.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -419,8 +419,8 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # With `align`, MuJoCo would move a free body's frame to its inertial frame.
-        # The next loop replaces all inertias by placeholders, so `align` is switched off.
+        # With `align`, MuJoCo moves the frame of a free body to the body's inertial frame.
+        # `align` is switched off, because the loop below replaces all inertias by placeholders.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -568,10 +568,13 @@ class _MjcfReader:
             yield name, resolve_rule(rules, name)
 
     def _read_rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
+        """Return the mimic joint and the mimic rule of equality `i`, or None.
 
-        Here x0 and y0 are the joints' reference values. Return None if the equality is not a linear relation
-        of two joints.
+        The equality is a mimic rule if it is a linear relation of two joints x and y:
+
+        `y - y0 = c0 + c1 (x - x0)`
+
+        Here x0 and y0 are the reference values of the joints. The mimic joint is y.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
@@ -604,10 +607,7 @@ def depends_on(rules: Mapping[str, Mimic], joint: str, other: str) -> bool:
 
 
 def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
-    """Combine the mimic rules from `joint` to an independent joint into one rule.
-
-    The mimicked joint of the combined rule is the independent joint.
-    """
+    """Combine the mimic rules from `joint` to an independent joint into one rule."""
     rule = rules[joint]
     while rule.mimicked_joint in rules:
         end = rules[rule.mimicked_joint]

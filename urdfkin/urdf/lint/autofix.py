@@ -93,7 +93,7 @@ def fix_text(
 
 def _find_objections(before: Examination, after: Examination, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # `findings` contains only some findings of a very frequent code. Such codes are not compared.
+    # One finding represents several findings of a very frequent code. Such codes are not compared.
     many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)

@@ -95,8 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element and the name of an attribute.
-#: The name None means the element itself.
+#: An element, and the name of an attribute. If the name is None, the pair stands for the element.
 _ElementOrAttribute = tuple[Element, str | None]
 
 

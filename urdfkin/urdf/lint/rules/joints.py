@@ -529,8 +529,7 @@ NOTICEABLE_DISPLACEMENT = 1e-3
 #: Maximum difference (rad) of an angle that counts as an exact k * pi.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs (k, minimum number of decimals of a rounded k * pi).
-#: Angles with fewer decimals do not count as rounded k * pi.
+#: Pairs (k, n). A rounded k * pi has at least n decimals.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -708,7 +707,10 @@ def _check_equal_joints(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return, for each link, the upper bound (m) on the distance of descendants if all translations are 0."""
+    """Return an upper bound (m) on each link's distance to its descendants, by link name.
+
+    The bounds assume that all translations of joints are 0.
+    """
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})
     for link in order:
