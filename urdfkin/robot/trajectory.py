@@ -378,7 +378,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return a dict from each number's name in q, v or a to its unit, such as "m/s"; "" for quaternions."""
+    """Return the units of the numbers in q, v or a by name, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -446,10 +446,10 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. If `requires_header` is True, this line must contain the names. If no
-    line contains names, the columns are those in `required`, in this order. A heading may end with a unit,
-    such as `elbow [deg]`. `units` contains the SI unit of each column that may have a unit.
+    Empty lines and lines that begin with # are skipped. The first remaining line may be a header: the names
+    of the columns, in any order. If `requires_header` is True, the text must have a header. Without a header,
+    the columns are `required`, in this order. A heading may end with a unit, such as `elbow [deg]`. `units`
+    contains the SI unit of each column that may have a unit.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -624,12 +624,11 @@ def _check_columns(
 
 
 #: If a joint's samples span more than this angle (rad), the samples stay unchanged.
-#: The angle is 2 pi plus a margin.
-#: The margin covers angles that are rounded to two decimals.
+#: The margin of 0.02 covers angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.
-#: Rotations by 130 and by -230 degrees lead to the same pose.
-#: Above 120 degrees, the larger of the two rotations is less than twice as large as the smaller one.
+#: For example, rotations by 130 and by -230 degrees lead to the same pose.
+#: At 120 degrees, the rotation in the other direction is twice as large.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error.

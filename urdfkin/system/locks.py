@@ -52,9 +52,8 @@ class ImportLock:
 
     A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. A thread that
     holds the import lock may need the lock of `logging` during the import. To avoid a deadlock, a fork must
-    acquire the import lock before the lock of `logging`. Before a fork, Python calls the function that was
-    registered last first. Therefore, `register_fork_handlers` imports `logging` before registering
-    `_before_fork`.
+    acquire the import lock before the lock of `logging`. Before a fork, Python calls the registered functions
+    in reverse order. Therefore, `register_fork_handlers` imports `logging` before registering `_before_fork`.
     """
 
     def __init__(self) -> None:

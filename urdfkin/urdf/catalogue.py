@@ -45,8 +45,8 @@ class CatalogueEntry:
         mimic: Whether the mimic rules of the URDF are valid. If False, urdfkin ignores all
             mimic rules by default.
         mimic_problem: The reason why the mimic rules of the URDF are invalid; None if the rules are valid.
-        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0; in
-            the pose `ready`, a joint with limits that exclude 0 is at the middle of its limits.
+        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0. In
+            the pose `ready`, they have the middle of their limits if the limits exclude 0.
         is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
 

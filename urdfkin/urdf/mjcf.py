@@ -180,11 +180,8 @@ class Mjcf:
     def _make_frame_values(self, body_values: FloatArray, site_values: FloatArray) -> FloatArray:
         """Return one number for each sample and frame, shape (n, frames).
 
-        `body_values` has the shape (n, bodies), and `site_values` has the shape (sites,). The columns of the
-        result are:
-
-        - for body i: `body_values[:, i]`
-        - for a site on body i: `body_values[:, i] + site_values[site]`
+        `body_values` has the shape (n, bodies), and `site_values` has the shape (sites,). The value of a site
+        is the sum of the site's own value and the value of its body.
         """
         columns = [
             body_values[:, i]
@@ -319,8 +316,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
 def _load_spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # A confined process cannot start threads.
-    # Only dynamics needs the memory sizes in the file.
-    # The value -1 selects MuJoCo's default sizes.
+    # The file can set memory sizes for dynamics. The value -1 selects MuJoCo's default sizes.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
@@ -350,7 +346,7 @@ def _has_moving_descendants(body: Any) -> bool:
 def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
     what = "MuJoCo aligns the frame of this free body with the body's inertial frame"
     if not with_shapes:
-        what += "; the file was read without shapes and inertias, so urdfkin uses the frame in the file"
+        what += "; the file was read without shapes and inertias, so urdfkin uses the body frame in the file"
     return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 

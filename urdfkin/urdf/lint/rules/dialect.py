@@ -158,9 +158,9 @@ _VENDOR_NAMES_TEXT = (
 )
 VENDOR_NAMES = frozenset(_VENDOR_NAMES_TEXT.split())
 
-#: Lines of the form `element: attributes > child elements`.
-#: If a line has no colon, the attributes of the element are not checked.
-#: If this table has no line for an element, the content of the element is not checked.
+#: Each line has the form `element: attributes > child elements`.
+#: The attributes of an element without a colon are not checked.
+#: Elements without a line are not checked.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision

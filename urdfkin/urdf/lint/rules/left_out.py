@@ -135,8 +135,8 @@ def _find_positions(
 def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
     """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
 
-    An equality constraint without a name is named by its index. After an `<include>`, the index of a
-    constraint is unknown. Constraints without a name are then skipped.
+    An equality constraint without a name is identified by its index. After an `<include>`, the index is
+    unknown, so constraints without a name are skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
