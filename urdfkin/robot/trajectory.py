@@ -153,8 +153,8 @@ class Trajectory:
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates_source: How v and a were obtained, such as "by central differences".
-        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a were
-            read from a file or computed by central differences; see `errors`.
+        exact: Whether v and a are the exact derivatives of q, except for rounding. They are not exact if they
+            come from a file or from central differences.
         notes: Remarks for the user, one line each. For example, a remark names a joint whose angle was
             unwrapped.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
@@ -339,7 +339,7 @@ def _central_differences(
 
 
 def _estimate_error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of `fine`; `coarse` has twice the time step.
+    """Estimate the largest error of `fine` from `coarse`, which has twice the time step.
 
     The error of `coarse` is larger than the error of `fine` by the factor 2^`order`.
     """
@@ -567,7 +567,10 @@ def count_cells(text: str, where: str) -> int:
 def parse_numbers(
     cells: Sequence[str], where: str, names: Sequence[str], question: QuestionsSection | None = None
 ) -> list[float]:
-    """Parse one number for each name; the error for a wrong count refers to `question`."""
+    """Parse one number for each name.
+
+    If the number of cells is wrong, the error message refers to the section `question` of the documentation.
+    """
     if len(cells) != len(names):
         raise wrong_count_error(names, len(cells), where, question=question)
     values = []

@@ -143,10 +143,10 @@ def confine(is_allowed: Callable[[str], bool]) -> None:
         if not isinstance(path, str | bytes | os.PathLike) or not is_allowed(os.fsdecode(path)):
             raise RefusedError(
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. A xacro"
-                " file may read its own folder, package and repository. Also allowed are the folders on"
-                " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and the files and folders that an argument names."
-                " A package.xml in a folder above the xacro file, and the packages that $(find) finds, are"
-                " also allowed"
+                " file may read its own folder, package and repository. It may also read the folders on"
+                " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, the packages that $(find) finds, and a package.xml"
+                " in a folder above the xacro file. It may also read files and folders that the user passes"
+                " as arguments"
             )
 
     sys.addaudithook(refuse_forbidden)

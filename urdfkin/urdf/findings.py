@@ -45,7 +45,7 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
 
 
 #: A line of more than `MAX_EXCERPT_LENGTH` characters is cut.
-#: In such a line, at most `MAX_EXCERPT_LEAD` characters precede the underlined text.
+#: A cut line has at most `MAX_EXCERPT_LEAD` characters before the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB_SPACES = "    "
@@ -424,8 +424,7 @@ class CommentIndex:
 
 #: Maximum number of misspelt names in a file that get suggestions.
 MAX_NAME_SEARCHES = 20
-#: Limits of one search for similar names:
-#: number of names, and number of compared pairs of characters.
+#: Maximum number of names, and of compared pairs of characters, in one search for similar names.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
 #: With `fold`, one finding represents `MIN_FOLDED` or more warnings or notes with one code.
@@ -491,9 +490,8 @@ class Reporter:
     ) -> None:
         """Add a finding about an element, or about the line and column `position`.
 
-        The finding names the child of `<robot>` that contains the element. If `names_element` is True, the
-        finding names `element` instead of this child. If several warnings or notes are combined into one
-        finding, the finding with the greatest `weight` represents the others.
+        The finding names `element` if `names_element` is True, otherwise the child of `<robot>` that contains
+        `element`. If warnings or notes are combined, the finding with the greatest `weight` represents all.
         """
         severity = rule.severity if severity is None else severity
         reason = None

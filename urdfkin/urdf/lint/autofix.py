@@ -9,8 +9,8 @@ A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new f
   change by at most `Fix.max_rotation` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
-lines. If a line must be escaped, urdfkin therefore writes a git binary patch. A comment before the binary
+a CI service, for example an escape sequence. urdfkin escapes this text, but `git apply` refuses escaped
+lines. Therefore, urdfkin writes a git binary patch if a line must be escaped. A comment before the binary
 patch shows the escaped lines.
 """
 
@@ -140,12 +140,12 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor that covers the rounding errors in the sum of rotations `max_rotation`.
+#: This factor covers the rounding errors of the sum of the angles `Fix.max_rotation`.
 _ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`; fractions are exact."""
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`, without rounding errors."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)

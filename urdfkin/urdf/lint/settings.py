@@ -277,12 +277,12 @@ class FindingFilter:
 def find_known_findings(
     text: UrdfText, version: CommitFiles, examine: Callable[[UrdfText], Examination]
 ) -> Baseline | None:
-    """Return the findings of a file's older version; None for an unchanged file without new findings.
+    """Return the findings of the older version of a file. None means that all current findings are known.
 
-    An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
-    If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file are new.
-    Second, a mesh file that exists in the older version may be missing now. If the URDF contains the
-    name of a file deleted since that version, all findings about missing meshes are new.
+    All findings of an unchanged file are known, with two exceptions. First, a xacro file can include other
+    files. If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file
+    are new. Second, a mesh file that exists in the older version may be missing now. If the URDF contains
+    the name of a file deleted since that version, all findings about missing meshes are new.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:

@@ -273,7 +273,7 @@ def _is_link_or_joint(element: Element) -> bool:
 
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
-#: Tags of this length or longer are not a misspelt `link` or `joint`.
+#: Only shorter tags can be a misspelt `link` or `joint`.
 _MISSPELT_LENGTH_BOUND = 8
 
 

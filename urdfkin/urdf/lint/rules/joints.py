@@ -144,8 +144,7 @@ NOTE_LENGTH_ERROR = 2e-4
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: An axis with a small xy part and z > 0 counts as the z axis.
-#: The xy part is at most this fraction of the z component.
+#: An axis (x, y, z) counts as the z axis if z > 0 and |(x, y)| is at most this fraction of z.
 _Z_AXIS_TOLERANCE = 1e-9
 
 #: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
