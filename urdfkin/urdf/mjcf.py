@@ -13,7 +13,7 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 `Mjcf.remarks` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
 MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
-The inertial frame depends on the shapes, so MuJoCo needs the meshes to compile a file with such an option.
+With these options, MuJoCo needs the meshes to compile a file, because the inertial frame depends on them.
 """
 
 from __future__ import annotations
@@ -212,9 +212,11 @@ class Mjcf:
 
         The rounding error of a mimic rule is at most `MJCF_MIMIC_ROUNDINGS` * `EPS` * scale.
 
-        Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
-        s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The scale is s(y) (k + 1), where k is the number of
-        rules from y to an independent joint.
+        A joint y with the rule y = y0 + c0 + c1 (x - x0) has the scale (k + 1) s(y). Here k is the number of
+        rules in the chain from y to an independent joint. The size s of a joint is:
+
+        - for an independent joint: `s(x) = |x|`
+        - for a mimic joint: `s(y) = |y0| + |c0| + |c1| (s(x) + |x0|)`
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.mimic_equalities}

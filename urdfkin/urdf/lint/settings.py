@@ -258,7 +258,7 @@ class FindingFilter:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # Each baseline must count the finding. `any` would stop at the first baseline with the finding.
+            # With `sum`, each baseline counts the finding. `any` would stop early.
             return selected and not sum(baseline.consume(finding) for baseline in known)
 
         return is_reported

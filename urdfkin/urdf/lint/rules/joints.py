@@ -61,7 +61,7 @@ def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _check_loops_and_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Report loops, and links with several parent joints. Return True if the function reports nothing."""
+    """Report loops, and links with several parent joints. Return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
@@ -436,9 +436,8 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # `restrict_range` subtracts a rounding error at each end.
-        # A range of one value would become empty.
-        # Each end is therefore tested alone.
+        # `restrict_range` subtracts a rounding error at both ends of the range, so a range of one value
+        # becomes empty. Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -513,7 +512,7 @@ NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If the longest chain of a robot is shorter (m), the lengths were probably scaled twice.
+#: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
 #: A limit is probably in degrees if it is a whole number, and
@@ -623,9 +622,10 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 
 
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return k > 0 and the exact angle if `angle` is a rounded k * pi or -k * pi, otherwise None.
+    """Return k > 0 and the exact angle if `angle` is a rounded multiple of pi, otherwise None.
 
-    `text` is the angle as written in the file, and `angle` is the number (rad).
+    The exact angle is k * pi or -k * pi. `text` is the angle as written in the file, and `angle` is the
+    number (rad).
 
     >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
