@@ -64,7 +64,7 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         active_entries: (6, nv) booleans; False for an entry of the Jacobian that is 0 in every configuration.
-        breakdown: Contributions to the acceleration, for each joint and each term of the equation.
+        breakdown: Contributions of each joint to the acceleration, separately for each term.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.
         unverified_reason: Reason why Pinocchio cannot check the robot, or None.

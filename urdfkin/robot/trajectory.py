@@ -206,8 +206,8 @@ def make_line_trajectory(
     in seconds. `samples` is the number of samples, including the first and the last sample.
 
     Raises:
-        InputError: the duration is not above 0 s, `samples` is below 3, or a configuration has a wrong length
-            or a number that is not finite.
+        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length;
+            or a number is not finite.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)

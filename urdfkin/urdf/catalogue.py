@@ -11,9 +11,9 @@ folder that exists:
    F itself, `F/name`, and then each `F/*/name`. F itself counts only if it is called `name`.
 2. The environment variable `AMENT_PREFIX_PATH` lists folders. For each folder F of this list, urdfkin tries
    `F/share/name`.
-3. In each parent folder of `referring_file`, from the nearest folder to `/`, urdfkin searches for the
-   subfolder `name`. A parent folder is the package itself if the folder is called `name`, or if it contains
-   the `package.xml` of the package `name`. In this case, urdfkin first tries the parent folder.
+3. For each parent folder F of `referring_file`, from the nearest folder to `/`, urdfkin tries F itself and
+   then `F/name`. F itself counts only if it is called `name`, or if `F/package.xml` declares the package
+   `name`.
 """
 
 from __future__ import annotations

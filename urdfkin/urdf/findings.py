@@ -94,8 +94,7 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Upper bound (rad) on the rounding error of an angle.
-#: The angle is at most one revolution.
+#: Upper bound (rad) on the rounding error of an angle of at most one revolution.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -105,8 +104,8 @@ class Fix:
 
     Attributes:
         edits: Edits of the text, in file order, without overlap.
-        max_rotation: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the
-            fix does not change the robot.
+        max_rotation: The fix rotates a joint frame by at most this angle (rad). The angle is 0 if the fix
+            does not change the robot.
     """
 
     edits: tuple[Edit, ...]
@@ -467,10 +466,10 @@ class Reporter:
     _name_search_count: int = 0
     _replaced_characters: bool | None = None
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
-    #: The last element that `_spans` read, and its result.
+    #: Cache of `_spans` for one element.
     _cached_element: Element | None = None
     _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
-    #: For each finding that is added before the call of `silence`: its element, by the id of the finding.
+    #: Elements of the findings that are added before the call of `silence`, by the id of the finding.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(
@@ -582,7 +581,7 @@ class Reporter:
     def has_replaced_characters(self) -> bool:
         """Whether an attribute value may contain a tab, a line end or a reference such as `&amp;`.
 
-        XML parsers replace these characters. The search also finds such text outside tags.
+        XML parsers replace these characters. The result can also be True for similar text outside tags.
         """
         if self._replaced_characters is None:
             self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None

@@ -133,8 +133,8 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY_INCOMPLETE = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of each shape:
-#: name, count of numbers, and whether the attribute is required.
+#: Numeric attributes of each shape.
+#: A tuple contains the attribute's name, its count of numbers, and whether it is required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

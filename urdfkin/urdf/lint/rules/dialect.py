@@ -371,7 +371,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribu
 
 
 def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix and the name of its attribute; the name is None for the tag's prefix."""
+    """Yield each namespace prefix, with the name of its attribute or with None for the tag's prefix."""
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

@@ -147,12 +147,12 @@ _UNIT_LENGTH_TOLERANCE = 1e-12
 #: An axis (x, y, z) counts as the z axis if z > 0 and |(x, y)| is at most this fraction of z.
 _Z_AXIS_TOLERANCE = 1e-9
 
-#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
+#: Pinocchio replaces an axis by a coordinate axis if their relative difference is at most this number.
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: Maximum angle (rad) between an axis and a coordinate axis that is not reported.
-#: The error bounds in `verify.bounds` cover this difference.
+#: If the angle (rad) between an axis and a coordinate axis is at most this number, it is not reported.
+#: The error bounds in `verify.bounds` cover this angle.
 _NEGLIGIBLE_TILT = 2.0**-52
 
 
@@ -224,7 +224,7 @@ def _check_snapped_axis(
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
     """Return, by joint name, the angle (rad) between the axis in the file and Pinocchio's axis.
 
-    A joint has no entry if Pinocchio keeps the axis, or rotates the axis by at most 2^-52 rad.
+    Joints with an angle of at most 2^-52 rad have no entry.
     """
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
@@ -233,7 +233,7 @@ def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
 
-    Return None if Pinocchio keeps the axis, or if the angle is at most `_NEGLIGIBLE_TILT`.
+    Return None if the angle is at most `_NEGLIGIBLE_TILT`.
     """
     if axis is None:
         return None
@@ -331,9 +331,9 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: A mimic joint's limits can exclude part of the mimicked joint's range.
-#: URDF527 reports parts above this fraction of the range.
-#: Limits with few digits often exclude a small fraction of the range.
+#: The limits of a mimic joint can exclude part of the mimicked joint's range.
+#: URDF527 reports an excluded part that is larger than this fraction of the range.
+#: Limits with few digits often exclude a smaller part.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -475,7 +475,7 @@ class _MimicChecker:
 def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
     """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
 
-    Return None for joints of other types, for a missing `<limit>`, and if lower >= upper.
+    Return None for other joint types, for a missing `<limit>`, and for lower >= upper.
     """
     if joint.kind == "continuous":
         return -math.pi, math.pi

@@ -59,7 +59,7 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: {(tag, name): (line, column, width)} for the beginning of each element or prim.
+#: Maps (tag, name) of an element or prim to (line, column, width) of its beginning.
 #: Lines and columns count from 1.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
