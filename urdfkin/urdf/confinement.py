@@ -127,9 +127,9 @@ def limit_process(seconds: int) -> None:
 
 
 def confine(is_allowed: Callable[[str], bool]) -> None:
-    """From now on, refuse all audit events of this process except harmless events and reads of allowed files.
+    """Permit only harmless audit events and reads of allowed files, until this process ends.
 
-    `is_allowed` receives the path of a file or folder. A refused event raises RefusedError.
+    `is_allowed` receives the path of a file or folder. Any other event raises RefusedError.
     """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:

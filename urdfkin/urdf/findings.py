@@ -669,7 +669,7 @@ def _find_attribute_spans(data: bytes, element: Element) -> Iterator[tuple[str, 
 
 
 def start_of_blanks(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the index at which the white space before `start` begins."""
+    """Return the first index of the white space that ends before the index `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start

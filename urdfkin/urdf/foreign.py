@@ -200,16 +200,16 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: {index of a joint: name of the link that the joint moves}.
+        #: Maps the index of a joint to the name of the link that the joint moves.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: {index of a converted frame: name of its link}.
+        #: Maps the index of a converted frame to the name of its link.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
-        """For each body with the frame of a joint, yield the index of the joint and of the body.
+        """Yield (joint, body) as indices, for each body that has the same frame as its joint.
 
-        The bodies are in reverse order, so a dictionary of the pairs keeps the first body of each joint.
+        The pairs are in reverse order, so that `dict` keeps the first body of each joint.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():

@@ -39,7 +39,7 @@ from urdfkin.urdf.sources import UrdfText
 #: A pass fixes findings of one code only.
 MAX_PASSES = 100
 
-#: Upper bound (rad) on the angle by which rounding to doubles rotates a unit vector.
+#: Rounding to doubles rotates a unit vector by at most this angle (rad).
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 

@@ -23,9 +23,9 @@ MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 #: If 0 < mass < NEGLIGIBLE_MASS, the moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Tolerance per kg of mass (m^2) of two checks of the principal moments:
-#: no moment is negative, and none exceeds the sum of the other two.
-#: Only bodies with a radius of gyration below 0.03 mm have smaller moments.
+#: No principal moment may be negative or exceed the sum of the other two.
+#: The tolerance of these checks is this number (m^2) times the mass.
+#: The square root of this number, 0.03 mm, is the radius of gyration of a tiny body.
 NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of the moments of inertia in a file.

@@ -580,8 +580,8 @@ def _check_rounded(
 ) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
-    The message quotes the angle with the largest rounding error.
-    `condition` is the condition under which the links below are at most `reach` metres away.
+    The message quotes the angle with the largest rounding error. The distance to the links below is at most
+    `reach` (m) under the condition `condition`, a text for the message.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
