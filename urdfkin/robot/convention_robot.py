@@ -114,7 +114,7 @@ class ConventionRobot:
     ) -> FloatArray:
         """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
         ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *arguments, **options)
-        # A second result in `out` would replace the first.
+        # `out` already contains `rate`.
         J = self.robot.jacobian(ours[0], frame, *arguments, **{**options, "out": None})
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 

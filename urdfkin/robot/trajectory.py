@@ -155,8 +155,7 @@ class Trajectory:
         rates_source: How v and a were obtained, such as "by central differences".
         exact: Whether v and a are the exact derivatives of q, except for rounding. They are not exact if they
             come from a file or from central differences.
-        notes: Remarks for the user, one line each. For example, a remark names a joint whose angle was
-            unwrapped.
+        notes: Remarks for the user, one line each. For example, a remark names a joint with unwrapped angles.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and
             a were read from a file or are exact, or if there are fewer than 5 samples.
@@ -378,7 +377,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the units of the numbers in q, v or a by name, such as "m/s"; "" for quaternions."""
+    """Return the unit of each number in q, v or a by name, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -734,7 +733,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint whose pose changes when the mimicked joint is unwrapped."""
+    """Yield a note for each mimic joint with a pose that depends on the unwrapping of the mimicked joint."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

@@ -13,7 +13,7 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 `Mjcf.remarks` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
 MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
-With these options, MuJoCo needs the meshes to compile a file, because the inertial frame depends on them.
+The inertial frame depends on the shapes. With these options, MuJoCo therefore needs the meshes.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        The placements of frames in `fused_model` are computed with `fused_model`.
+        `fused_model` computes the placements of its frames, and `model` computes all other placements.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))

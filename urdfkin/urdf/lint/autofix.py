@@ -3,7 +3,7 @@
 A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new file if three conditions hold:
 
 - The number of findings falls by at least the number of fixes.
-- The new file has no new findings.
+- The new file has no new findings. urdfkin does not compare codes with more than 10,000 findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
   change by at most `Fix.max_rotation` (rad).
@@ -93,7 +93,7 @@ def fix_text(
 
 def _find_objections(before: Examination, after: Examination, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # One finding represents several findings of a very frequent code. Such codes are not compared.
+    # `findings` is incomplete for codes with more than 10,000 findings. These codes are not compared.
     many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
