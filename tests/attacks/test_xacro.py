@@ -153,7 +153,7 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
     message = refused(expanded, inside.replace('default=""', f'default="{secret}"'))
     for words in (
-        "and the files and folders that an argument names",
+        "It may also read files and folders that the user passes as arguments",
         "if VALUE is the path of a file or folder, the xacro file may read this path",
     ):
         assert words in message

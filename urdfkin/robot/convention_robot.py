@@ -22,7 +22,7 @@ class ConventionRobot:
     Each method has the name and the arguments of a method of `Robot`. The target program's order applies
     to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's units
     apply to q, v and a, and to the columns of Jacobians: J v is in m/s and rad/s. Pinocchio checks each
-    result before the conversion. An array `out` receives the result before the conversion.
+    result before urdfkin converts the result. An array `out` receives the unconverted result.
 
     Attributes:
         robot: The robot.
@@ -114,7 +114,7 @@ class ConventionRobot:
     ) -> FloatArray:
         """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
         ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *arguments, **options)
-        # A second result in `out` would replace the first.
+        # `out` already contains `rate`.
         J = self.robot.jacobian(ours[0], frame, *arguments, **{**options, "out": None})
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 

@@ -64,10 +64,10 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         active_entries: (6, nv) booleans; False for an entry of the Jacobian that is 0 in every configuration.
-        breakdown: Contributions to the acceleration, for each joint and each term of the equation.
+        breakdown: Contributions of each joint to the acceleration, separately for each term.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.
-        unverified_reason: Reason why Pinocchio cannot check the robot; None if Pinocchio can.
+        unverified_reason: Reason why Pinocchio cannot check the robot, or None.
 
     >>> import urdfkin
     >>> urdfkin.frame_motion(urdfkin.load("planar_two_link"), ([[0, 0]], [[1, 0]], [[0, 0]]), "tip")
@@ -124,10 +124,10 @@ class FrameMotion:
         return np.asarray(np.linalg.svd(self.jacobian[:, rows], compute_uv=False), dtype=np.float64)
 
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
-        """Return Yoshikawa's manipulability sqrt(det J J^T), the product of the singular values.
+        """Return Yoshikawa's manipulability, the product of the singular values of the Jacobian J.
 
-        With fewer joint velocities than rows, det J J^T is 0, and the result is sqrt(det J^T J). Columns that
-        are 0 for every q are left out, as in `Robot.singular_values`.
+        The product equals sqrt(det J J^T). If J has more rows than columns, the product equals
+        sqrt(det J^T J). Columns that are 0 for every q are left out, as in `Robot.singular_values`.
 
         Args:
             rows: The rows of the Jacobian to use.

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Findings that help only the author of a URDF file.
-#: A URDF that urdfkin generated causes no such warnings.
+#: Warnings that help only the author of a URDF file.
+#: urdfkin does not show these warnings for a URDF that urdfkin generated.
 _FINDINGS_FOR_AUTHORS = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -347,10 +347,10 @@ def make_robot(
     table: bool = False,
     quiet: bool = False,
 ) -> Robot:
-    """Return the robot that a URDF text describes; the options `verify` to `joints` are those of `load`.
+    """Make a robot from URDF text. The arguments from `verify` to `joints` mean the same as in `load`.
 
     `is_generated` states whether urdfkin generated the text from another source. `source_findings` contains
-    findings about that source. `table` states whether the source is a Denavit-Hartenberg table or a product
+    findings about this source. `table` states whether the source is a Denavit-Hartenberg table or a product
     of exponentials. If `quiet` is True, no warnings are issued.
     """
     oracle_library(oracle)

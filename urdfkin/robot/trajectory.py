@@ -153,10 +153,9 @@ class Trajectory:
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates_source: How v and a were obtained, such as "by central differences".
-        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a were
-            read from a file or computed by central differences; see `errors`.
-        notes: Remarks for the user, one line each. For example, a remark names a joint whose angle was
-            unwrapped.
+        exact: Whether v and a are the exact derivatives of q, except for rounding. They are not exact if they
+            come from a file or from central differences.
+        notes: Remarks for the user, one line each. For example, a remark names a joint with unwrapped angles.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and
             a were read from a file or are exact, or if there are fewer than 5 samples.
@@ -206,8 +205,8 @@ def make_line_trajectory(
     in seconds. `samples` is the number of samples, including the first and the last sample.
 
     Raises:
-        InputError: the duration is not above 0 s, `samples` is below 3, or a configuration has a wrong length
-            or a number that is not finite.
+        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length;
+            or a number is not finite.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)
@@ -228,8 +227,7 @@ def make_line_trajectory(
             step[to] = q_1[at] - q_0[at]
     # The velocity v is s' * step, and the acceleration a is s'' * step.
     # Here s' and s'' are the first and the second time derivative of s.
-    # The same formulas hold for planar and floating joints.
-    # `step` is the joint's constant twist in the moving frame.
+    # For a planar or floating joint, `step` is a constant twist in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -248,10 +246,10 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. If the file has no a, or neither v nor a, urdfkin computes
-    the missing arrays by central differences. Before v is computed, the angles of continuous, planar and
-    floating joints are unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report
-    these computations.
+    Without t, the samples are one second apart. If a is missing, urdfkin computes a by central differences.
+    If v is missing too, urdfkin also computes v, after unwrapping the angles of continuous, planar and
+    floating joints. The attributes `rates_source`, `errors` and `notes` of the result report these
+    computations.
 
     Args:
         robot: The robot.
@@ -281,7 +279,7 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
-    """Read a file's samples like `read_trajectory`; a missing array t, v or a stays None."""
+    """Read the samples of a file; a missing t, v or a becomes None."""
     archive = path.suffix.lower() == ".npz"
     data = _read_npz(path, conversion or robot) if archive else _read_table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -340,7 +338,7 @@ def _central_differences(
 
 
 def _estimate_error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of `fine`; `coarse` has twice the time step.
+    """Estimate the largest error of `fine` from `coarse`, which has twice the time step.
 
     The error of `coarse` is larger than the error of `fine` by the factor 2^`order`.
     """
@@ -379,7 +377,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return a dict from each number's name in q, v or a to its unit, such as "m/s"; "" for quaternions."""
+    """Return the unit of each number in q, v or a by name, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -447,10 +445,10 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. If `requires_header` is True, this line must contain the names. If no
-    line contains names, the columns are those in `required`, in this order. A heading may end with a unit,
-    such as `elbow [deg]`. `units` contains the SI unit of each column that may have a unit.
+    Empty lines and lines that begin with # are skipped. The first remaining line may be a header: the names
+    of the columns, in any order. If `requires_header` is True, the text must have a header. Without a header,
+    the columns are `required`, in this order. A heading may end with a unit, such as `elbow [deg]`. `units`
+    contains the SI unit of each column that may have a unit.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -568,7 +566,10 @@ def count_cells(text: str, where: str) -> int:
 def parse_numbers(
     cells: Sequence[str], where: str, names: Sequence[str], question: QuestionsSection | None = None
 ) -> list[float]:
-    """Parse one number for each name; the error for a wrong count refers to `question`."""
+    """Parse one number for each name.
+
+    If the number of cells is wrong, the error message refers to the section `question` of the documentation.
+    """
     if len(cells) != len(names):
         raise wrong_count_error(names, len(cells), where, question=question)
     values = []
@@ -625,12 +626,11 @@ def _check_columns(
 
 
 #: If a joint's samples span more than this angle (rad), the samples stay unchanged.
-#: The angle is 2 pi plus a margin.
-#: The margin covers angles that are rounded to two decimals.
+#: The margin of 0.02 covers angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.
-#: Rotations by 130 and by -230 degrees lead to the same pose.
-#: Above 120 degrees, the larger of the two rotations is less than twice as large as the smaller one.
+#: For example, rotations by 130 and by -230 degrees lead to the same pose.
+#: At 120 degrees, the rotation in the other direction is twice as large.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error.
@@ -733,7 +733,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint whose pose changes when the mimicked joint is unwrapped."""
+    """Yield a note for each mimic joint with a pose that depends on the unwrapping of the mimicked joint."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

@@ -33,10 +33,10 @@ from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_if_exists
 #: The digest in a folder's name depends on the checksum's version.
 _CHECKSUM_VERSION = "sealed with its name"
 _MAX_UNUSED_SECONDS = 30 * 24 * 3600.0
-#: The modification time of this file is the folder's last use.
+#: `make_cache_folder` updates the modification time of this file. Unused folders are deleted later.
 _LAST_USE_FILE = ".used"
 #: Other users that may own parent folders: root (0) and 65534.
-#: In a container, 65534 is the host's root.
+#: In a container, folders of the host's root can belong to user 65534.
 _TRUSTED_OWNERS = (0, 65534)
 
 

@@ -149,9 +149,9 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Find an entry of `data` that is missing in `document`, the result of the conversion of `data`.
+    """Find an entry of `data` that `document` does not have.
 
-    Return the JSON path of the mapping with the missing entry, and a message. None: no entry is missing.
+    Return the JSON path of the mapping with the entry, and a message. Return None if there is no such entry.
     """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:

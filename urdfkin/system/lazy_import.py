@@ -48,7 +48,7 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    # `metadata` imports many modules.
+    # `metadata` is imported late, because `metadata` imports many modules.
     # At the start of urdfkin, files in the current folder could replace these modules.
     from importlib import metadata
 
@@ -58,7 +58,7 @@ def installed_version(package: str) -> str | None:
         return None
 
 
-#: Copy of the requirements of the extras for users in pyproject.toml.
+#: The extras for users and their requirements, as in pyproject.toml.
 EXTRA_REQUIREMENTS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",

@@ -19,7 +19,7 @@ def make_fork_safe_lock() -> threading.RLock:
     """Return a lock that is unlocked in a child process after a fork.
 
     A fork waits until the lock is free. A fork acquires the newest lock first and the oldest lock last.
-    A thread that needs two locks must acquire first the lock that was made last, as a fork does.
+    A thread that needs two locks must also acquire the newer lock first.
     The opposite order can cause a deadlock.
 
     Use this function only for module variables, because this module stores each lock until the process ends.
@@ -38,23 +38,22 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # If another thread registered `_before_fork` during this fork, `_acquired_locks` has no entry for this
-    # thread.
+    # Another thread can register `_before_fork` during this fork. Then `_acquired_locks` has no entry for the
+    # forking thread.
     for lock in reversed(_acquired_locks.pop(threading.get_ident(), [])):
         lock.release()
 
 
 class ImportLock:
-    """Lock of urdfkin, not of Python, for imports inside functions, such as those of `lazy_import`.
+    """Lock for imports inside functions of urdfkin, for example in `lazy_import`.
 
-    Without this lock, another thread could fork a child process during the import. The child process would
-    then wait for ever for the end of the import.
+    Without this lock, another thread could fork a child process during an import. The child process would
+    then wait for ever for the end of the import. This lock is not Python's import lock.
 
     A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. A thread that
     holds the import lock may need the lock of `logging` during the import. To avoid a deadlock, a fork must
-    acquire the import lock before the lock of `logging`. Before a fork, Python calls the function that was
-    registered last first. Therefore, `register_fork_handlers` imports `logging` before registering
-    `_before_fork`.
+    acquire the import lock before the lock of `logging`. Before a fork, Python calls the registered functions
+    in reverse order. Therefore, `register_fork_handlers` imports `logging` before registering `_before_fork`.
     """
 
     def __init__(self) -> None:
@@ -62,7 +61,8 @@ class ImportLock:
         _locks.append(self._lock)
 
     def register_fork_handlers(self) -> None:
-        # This return avoids a deadlock: the holder of the lock may wait for the import of the calling module.
+        # Waiting for the lock here could cause a deadlock: the thread that holds the lock may wait for the
+        # import of the calling module.
         if self._registered:
             return
         with self._lock:

@@ -7,13 +7,13 @@ robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`
 The function `find_package` searches for the folder of a package `name` in this order, and returns the first
 folder that exists:
 
-1. The environment variable `ROS_PACKAGE_PATH` lists folders. In each folder `src` of this list, urdfkin
-   searches for `src/name`, then for each `src/*/name`. If `src` is called `name`, urdfkin first tries `src`.
-2. The environment variable `AMENT_PREFIX_PATH` lists folders. In each folder `prefix` of this list, urdfkin
-   searches for `prefix/share/name`.
-3. In each parent folder of `referring_file`, from the nearest folder to `/`, urdfkin searches for the
-   subfolder `name`. A parent folder is the package itself if the folder is called `name`, or if it contains
-   the `package.xml` of the package `name`. In this case, urdfkin first tries the parent folder.
+1. The environment variable `ROS_PACKAGE_PATH` lists folders. For each folder F of this list, urdfkin tries
+   F itself, `F/name`, and then each `F/*/name`. F itself counts only if it is called `name`.
+2. The environment variable `AMENT_PREFIX_PATH` lists folders. For each folder F of this list, urdfkin tries
+   `F/share/name`.
+3. For each parent folder F of `referring_file`, from the nearest folder to `/`, urdfkin tries F itself and
+   then `F/name`. F itself counts only if it is called `name`, or if `F/package.xml` declares the package
+   `name`.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class CatalogueEntry:
         mimic: Whether the mimic rules of the URDF are valid. If False, urdfkin ignores all
             mimic rules by default.
         mimic_problem: The reason why the mimic rules of the URDF are invalid; None if the rules are valid.
-        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0; in
-            the pose `ready`, a joint with limits that exclude 0 is at the middle of its limits.
+        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0. In
+            the pose `ready`, they have the middle of their limits if the limits exclude 0.
         is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
 

@@ -2,8 +2,8 @@
 
 The operating system limits the memory and time of the process, and prevents the process from writing files
 and from starting other processes. Python raises an audit event for each opened file, new process, socket and
-import. An audit hook refuses all events except the allowed events. The process cannot remove the limits or
-the hook. A xacro file that controls the Python interpreter could circumvent the hook, but not the limits.
+import. An audit hook refuses all events except the allowed events. The hook and the limits remain until the
+process ends. A xacro file that controls the Python interpreter could circumvent the hook, but not the limits.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
@@ -62,8 +62,8 @@ class AllowedPaths:
         """Return the paths that urdfkin may read to load the robot file `path`.
 
         `roots` contains the folder, the ROS package and the git repository of the file. `roots` also contains
-        the folders in `package_paths`, and the files and folders that `arguments` names. The home folder
-        and `/` do not count as package, repository or argument.
+        the folders in `package_paths` and the existing paths in `arguments`. The home folder and `/` do not
+        count as package, repository or argument.
         """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for file_name in ("package.xml", ".git"):
@@ -92,7 +92,7 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or is below `root` and no name below `root` begins with a dot."""
+    """Return whether `path` is `root`, or a path below `root`. Below `root`, no name may begin with a dot."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -127,9 +127,9 @@ def limit_process(seconds: int) -> None:
 
 
 def confine(is_allowed: Callable[[str], bool]) -> None:
-    """From now on, refuse all audit events of this process except harmless events and reads of allowed files.
+    """Permit only harmless audit events and reads of allowed files, until this process ends.
 
-    `is_allowed` receives the path of a file or folder. A refused event raises RefusedError.
+    `is_allowed` receives the path of a file or folder. Any other event raises RefusedError.
     """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:
@@ -143,10 +143,10 @@ def confine(is_allowed: Callable[[str], bool]) -> None:
         if not isinstance(path, str | bytes | os.PathLike) or not is_allowed(os.fsdecode(path)):
             raise RefusedError(
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. A xacro"
-                " file may read its own folder, package and repository. Also allowed are the folders on"
-                " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and the files and folders that an argument names."
-                " A package.xml in a folder above the xacro file, and the packages that $(find) finds, are"
-                " also allowed"
+                " file may read its own folder, package and repository. It may also read the folders on"
+                " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, the packages that $(find) finds, and a package.xml"
+                " in a folder above the xacro file. It may also read files and folders that the user passes"
+                " as arguments"
             )
 
     sys.addaudithook(refuse_forbidden)

@@ -33,7 +33,7 @@ def serve() -> None:
     request = json.load(sys.stdin)
     limit_process(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # A path in an include may be relative to this folder.
+    os.chdir(Path(request["path"]).parent)  # Paths in includes may be relative to the folder of the file.
     allowed_paths = AllowedPaths(**request["allowed_paths"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], allowed_paths)

@@ -169,7 +169,7 @@ class _Evaluation:
     GeneratorExp = ListComp
 
     def _iterations(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
-        """Yield an `_Evaluation` with the loop variables for each iteration of nested loops."""
+        """Run nested loops; for each iteration, yield an `_Evaluation` that knows the loop variables."""
         if not loops:
             yield self
             return

@@ -45,7 +45,7 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
 
 
 #: A line of more than `MAX_EXCERPT_LENGTH` characters is cut.
-#: In such a line, at most `MAX_EXCERPT_LEAD` characters precede the underlined text.
+#: A cut line has at most `MAX_EXCERPT_LEAD` characters before the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB_SPACES = "    "
@@ -94,8 +94,7 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Upper bound (rad) on the rounding error of an angle.
-#: The angle is at most one revolution.
+#: Upper bound (rad) on the rounding error of an angle of at most one revolution.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -105,8 +104,8 @@ class Fix:
 
     Attributes:
         edits: Edits of the text, in file order, without overlap.
-        max_rotation: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the
-            fix does not change the robot.
+        max_rotation: The fix rotates a joint frame by at most this angle (rad). The angle is 0 if the fix
+            does not change the robot.
     """
 
     edits: tuple[Edit, ...]
@@ -169,17 +168,16 @@ class Finding:
         message: The problem in one clause, without a full stop.
         found: The wrong text or value, for example `xyz="0 0 0"`, or None.
         remedy: The remedy, or None.
-        file: The path of the file, or a name such as `<text>` or `<stdin>`. After the path of a xacro file
-            follows ` (expanded)`.
+        file: The path of the file, or a name such as `<text>` or `<stdin>`. The path of a xacro file ends
+            with ` (expanded)`.
         line: Line number, from 1.
         column: Column number in characters, from 1.
-        element: The tag of the element with the problem: usually the child of `<robot>`, such as `joint`; a
-            tag of MJCF; or `prim` for USD. None for the whole file.
-        name: The name of this element, the path of the prim, or None.
+        element: The tag of the element with the problem, such as `joint` in URDF or `prim` in USD. In URDF,
+            it is usually a child of `<robot>`. None for the whole file.
+        name: The name of the element with the problem, or None. In USD, the path of the prim.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
-        other_lines: Line numbers of other findings with the same code. This finding represents the other
-            findings.
+        other_lines: Line numbers of more findings with the same code. This object also represents them.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -302,8 +300,8 @@ class UrdfError(UrdfkinError, ValueError):
     """A URDF has errors. The message lists the first five errors, each with file, line and column.
 
     Attributes:
-        findings: The findings of the file, including warnings and notes. If `load` raises the error, one
-            finding can represent several findings with the same code (`Finding.other_lines`).
+        findings: The findings of the file, including warnings and notes. `load` combines many findings with
+            the same code into one finding (`Finding.other_lines`).
 
     >>> import urdfkin
     >>> try:
@@ -425,8 +423,7 @@ class CommentIndex:
 
 #: Maximum number of misspelt names in a file that get suggestions.
 MAX_NAME_SEARCHES = 20
-#: Limits of one search for similar names:
-#: number of names, and number of compared pairs of characters.
+#: Maximum number of names, and of compared pairs of characters, in one search for similar names.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
 #: With `fold`, one finding represents `MIN_FOLDED` or more warnings or notes with one code.
@@ -469,10 +466,10 @@ class Reporter:
     _name_search_count: int = 0
     _replaced_characters: bool | None = None
     _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
-    #: The last element that `_spans` read, and its result.
+    #: Cache of `_spans` for one element.
     _cached_element: Element | None = None
     _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
-    #: For each finding that is added before the call of `silence`: its element, by the id of the finding.
+    #: Elements of the findings that are added before the call of `silence`, by the id of the finding.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(
@@ -492,9 +489,8 @@ class Reporter:
     ) -> None:
         """Add a finding about an element, or about the line and column `position`.
 
-        The finding names the child of `<robot>` that contains the element. If `names_element` is True, the
-        finding names `element` instead of this child. If several warnings or notes are combined into one
-        finding, the finding with the greatest `weight` represents the others.
+        The finding names `element` if `names_element` is True, otherwise the child of `<robot>` that contains
+        `element`. If warnings or notes are combined, the finding with the greatest `weight` represents all.
         """
         severity = rule.severity if severity is None else severity
         reason = None
@@ -585,7 +581,7 @@ class Reporter:
     def has_replaced_characters(self) -> bool:
         """Whether an attribute value may contain a tab, a line end or a reference such as `&amp;`.
 
-        XML parsers replace these characters. The search also finds such text outside tags.
+        XML parsers replace these characters. The result can also be True for similar text outside tags.
         """
         if self._replaced_characters is None:
             self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
@@ -652,7 +648,7 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Beginning of an attribute value with a tab, line end or reference such as `&amp;`.
+#: Matches an attribute value up to its first tab, line end or reference such as `&amp;`.
 #: Possessive quantifiers keep the matching time linear.
 _REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
@@ -673,7 +669,7 @@ def _find_attribute_spans(data: bytes, element: Element) -> Iterator[tuple[str, 
 
 
 def start_of_blanks(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the index at which the white space before `start` begins."""
+    """Return the first index of the white space that ends before the index `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start
@@ -684,11 +680,7 @@ def _sort_key(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
-    """Return the findings that are printed.
-
-    `other_lines` of the last returned finding contains the line numbers of the findings that are not
-    returned.
-    """
+    """Return the findings that are printed. The last one lists the line numbers of all other findings."""
     group.weighted_findings.sort(key=lambda pair: _sort_key(pair[0]))
     findings = [finding for finding, _ in group.weighted_findings]
     into_one = fold and group.severity is not Severity.ERROR

@@ -66,9 +66,9 @@ def convert_to_urdf(source: Any) -> tuple[str, str] | None:
 
 
 def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a note if a joint of a yourdfpy robot has an origin without rotation, otherwise ().
+    """Return a note about the joints of a yourdfpy robot that have an origin without rotation.
 
-    yourdfpy (0.0.60) ignores quat_xyzw, so the rotation in the file may be lost.
+    yourdfpy (0.0.60) ignores quat_xyzw, so such a joint may have lost the rotation in the file.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -163,10 +163,8 @@ class ConvertedModel:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: Maps the name of a link to the index of a Pinocchio joint. The frame of the joint is the frame
-            of the link.
-        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame. This
-            frame is the frame of the link.
+        joints: Maps the name of a link to the index of a Pinocchio joint. Link and joint have the same frame.
+        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame.
     """
 
     tree: KinematicTree
@@ -202,16 +200,16 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: {index of a joint: name of the link that the joint moves}.
+        #: Maps the index of a joint to the name of the link that the joint moves.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: {index of a converted frame: name of its link}.
+        #: Maps the index of a converted frame to the name of its link.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
-        """For each body with the frame of a joint, yield the index of the joint and of the body.
+        """Yield (joint, body) as indices, for each body that has the same frame as its joint.
 
-        The bodies are in reverse order, so a dictionary of the pairs keeps the first body of each joint.
+        The pairs are in reverse order, so that `dict` keeps the first body of each joint.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():

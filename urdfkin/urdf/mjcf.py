@@ -7,13 +7,13 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 - MuJoCo applies the joints of a body in sequence. Joint k has the anchor p_k and the motion J_k. Joint k
   changes the pose F of the body to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body
   with several joints becomes a chain of joints and links. The last link of the chain is the body.
-- The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
-  MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
+- A joint has the same value in urdfkin's q and in MuJoCo's qpos, because the joint origin includes MuJoCo's
+  reference value (`ref`). Only quaternions differ: MuJoCo stores the scalar part first.
 
 `Mjcf.remarks` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
 MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
-The inertial frame depends on the shapes, so MuJoCo needs the meshes to compile a file with such an option.
+The inertial frame depends on the shapes. With these options, MuJoCo therefore needs the meshes.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        If there is a fused model, its placements replace those of `model` for the frames that it contains.
+        `fused_model` computes the placements of its frames, and `model` computes all other placements.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -180,11 +180,8 @@ class Mjcf:
     def _make_frame_values(self, body_values: FloatArray, site_values: FloatArray) -> FloatArray:
         """Return one number for each sample and frame, shape (n, frames).
 
-        `body_values` has the shape (n, bodies), and `site_values` has the shape (sites,). The columns of the
-        result are:
-
-        - for body i: `body_values[:, i]`
-        - for a site on body i: `body_values[:, i] + site_values[site]`
+        `body_values` has the shape (n, bodies), and `site_values` has the shape (sites,). The value of a site
+        is the sum of the site's own value and the value of its body.
         """
         columns = [
             body_values[:, i]
@@ -215,9 +212,11 @@ class Mjcf:
 
         The rounding error of a mimic rule is at most `MJCF_MIMIC_ROUNDINGS` * `EPS` * scale.
 
-        Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
-        s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The scale is s(y) (k + 1), where k is the number of
-        rules from y to an independent joint.
+        A joint y with the rule y = y0 + c0 + c1 (x - x0) has the scale (k + 1) s(y). Here k is the number of
+        rules in the chain from y to an independent joint. The size s of a joint is:
+
+        - for an independent joint: `s(x) = |x|`
+        - for a mimic joint: `s(y) = |y0| + |c0| + |c1| (s(x) + |x0|)`
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.mimic_equalities}
@@ -319,8 +318,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
 def _load_spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # A confined process cannot start threads.
-    # Only dynamics needs the memory sizes in the file.
-    # The value -1 selects MuJoCo's default sizes.
+    # The file can set memory sizes for dynamics. The value -1 selects MuJoCo's default sizes.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
@@ -350,7 +348,7 @@ def _has_moving_descendants(body: Any) -> bool:
 def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
     what = "MuJoCo aligns the frame of this free body with the body's inertial frame"
     if not with_shapes:
-        what += "; the file was read without shapes and inertias, so urdfkin uses the frame in the file"
+        what += "; the file was read without shapes and inertias, so urdfkin uses the body frame in the file"
     return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 
@@ -419,8 +417,8 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # With `align`, MuJoCo would move a free body's frame to its inertial frame.
-        # The next loop replaces all inertias by placeholders, so `align` is switched off.
+        # With `align`, MuJoCo moves the frame of a free body to the body's inertial frame.
+        # `align` is switched off, because the loop below replaces all inertias by placeholders.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -568,10 +566,13 @@ class _MjcfReader:
             yield name, resolve_rule(rules, name)
 
     def _read_rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
+        """Return the mimic joint and the mimic rule of equality `i`, or None.
 
-        Here x0 and y0 are the joints' reference values. Return None if the equality is not a linear relation
-        of two joints.
+        The equality is a mimic rule if it is a linear relation of two joints x and y:
+
+        `y - y0 = c0 + c1 (x - x0)`
+
+        Here x0 and y0 are the reference values of the joints. The mimic joint is y.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
@@ -604,10 +605,7 @@ def depends_on(rules: Mapping[str, Mimic], joint: str, other: str) -> bool:
 
 
 def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
-    """Combine the mimic rules from `joint` to an independent joint into one rule.
-
-    The mimicked joint of the combined rule is the independent joint.
-    """
+    """Combine the mimic rules from `joint` to an independent joint into one rule."""
     rule = rules[joint]
     while rule.mimicked_joint in rules:
         end = rules[rule.mimicked_joint]

@@ -3,14 +3,14 @@
 A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new file if three conditions hold:
 
 - The number of findings falls by at least the number of fixes.
-- The new file has no new findings.
+- The new file has no new findings. urdfkin does not compare codes with more than 10,000 findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
   change by at most `Fix.max_rotation` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
-lines. If a line must be escaped, urdfkin therefore writes a git binary patch. A comment before the binary
+a CI service, for example an escape sequence. urdfkin escapes this text, but `git apply` refuses escaped
+lines. Therefore, urdfkin writes a git binary patch if a line must be escaped. A comment before the binary
 patch shows the escaped lines.
 """
 
@@ -39,7 +39,7 @@ from urdfkin.urdf.sources import UrdfText
 #: A pass fixes findings of one code only.
 MAX_PASSES = 100
 
-#: Upper bound (rad) on the angle by which rounding to doubles rotates a unit vector.
+#: Rounding to doubles rotates a unit vector by at most this angle (rad).
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
@@ -93,7 +93,7 @@ def fix_text(
 
 def _find_objections(before: Examination, after: Examination, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # `findings` contains only some findings of a very frequent code. Such codes are not compared.
+    # `findings` is incomplete for codes with more than 10,000 findings. These codes are not compared.
     many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -140,12 +140,12 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor that covers the rounding errors in the sum of rotations `max_rotation`.
+#: This factor covers the rounding errors of the sum of the angles `Fix.max_rotation`.
 _ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`; fractions are exact."""
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`, without rounding errors."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)

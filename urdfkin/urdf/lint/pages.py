@@ -56,8 +56,8 @@ class Page:
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
             example begins with a joint or a comment, the links `base` and `tip` must be added.
         correction: The corrected example.
-        other_readers: The behaviour of other readers for the example: Pinocchio (urdfdom) and yourdfpy for a
-            URDF, programs that read MJCF or USD for the other rules.
+        other_readers: The behaviour of other readers of the format for the example. For URDF, these readers
+            are Pinocchio (urdfdom) and yourdfpy.
     """
 
     title: str

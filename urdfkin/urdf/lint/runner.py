@@ -69,8 +69,8 @@ def check(
 
     Raises:
         SourceError: the file cannot be read, or the package of a `package://` address is not found.
-        UnknownNameError: the source is neither a file nor a catalogue name, or a .xacro file has no argument
-            of this name. The message lists the nearest names.
+        UnknownNameError: the source is neither a file nor a catalogue name, or the .xacro file does not
+            declare an argument in `xacro_args`. The message lists the nearest names.
         InputError: an argument has a wrong type or value.
         UrdfkinError: xacro cannot expand the file.
 

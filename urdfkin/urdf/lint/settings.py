@@ -1,13 +1,15 @@
 """Find the files and the settings for `urdfkin check`, and select the findings to report.
 
-Settings are in pyproject.toml. Files and patterns in the settings are relative to the folder of this file.
-Only the patterns of `include` are compared with file names:
+The settings are in pyproject.toml:
 
     [tool.urdfkin]
     ignore = ["URDF601"]
     exclude = ["third_party"]
     baseline = "urdfkin-baseline.json"
     per-file-ignores = { "legacy/*" = ["URDF5"] }
+
+Files and patterns in the settings are relative to the folder of pyproject.toml. The patterns of `include`
+are an exception: urdfkin compares them with file names.
 
 The settings select the codes of findings, and can hide notes. A selected finding is reported if it is neither
 in the baseline nor in an older version of the file. A baseline is a JSON file with known findings. A finding
@@ -256,7 +258,7 @@ class FindingFilter:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # Each baseline must count the finding. `any` would stop at the first baseline with the finding.
+            # With `sum`, each baseline counts the finding. `any` would stop early.
             return selected and not sum(baseline.consume(finding) for baseline in known)
 
         return is_reported
@@ -275,18 +277,18 @@ class FindingFilter:
 def find_known_findings(
     text: UrdfText, version: CommitFiles, examine: Callable[[UrdfText], Examination]
 ) -> Baseline | None:
-    """Return the findings of a file's older version; None for an unchanged file without new findings.
+    """Return the findings of the older version of a file. None means that all current findings are known.
 
-    An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
-    If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file are new.
-    Second, a mesh file that exists in the older version may be missing now. If the URDF contains the
-    name of a file deleted since that version, all findings about missing meshes are new.
+    All findings of an unchanged file are known, with two exceptions. First, a xacro file can include other
+    files. If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file
+    are new. Second, a mesh file that exists in the older version may be missing now. If the URDF contains
+    the name of a file deleted since that version, all findings about missing meshes are new.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # urdfkin cannot expand the older xacro file, so all findings are new after a change.
+        # urdfkin cannot expand the older version of a xacro file.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_XACRO_INCLUDE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
@@ -310,7 +312,7 @@ def find_files(
 ) -> list[str]:
     """Return the files that `argument` names, in sorted order.
 
-    Raise SourceError if `argument` is a folder or a pattern, and no file is found.
+    Raise SourceError if no file is found in a folder or for a pattern.
     """
     path = Path(argument)
     if argument == "-" or argument in catalogue():
@@ -344,6 +346,5 @@ def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequ
 
 
 def _find_matching_files(pattern: str) -> list[str]:
-    # Path.glob does not accept absolute patterns.
     names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207  Path.glob() refuses some patterns
     return sorted(unambiguous_path(name) for name in names if not is_folder(name))

@@ -23,9 +23,9 @@ MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 #: If 0 < mass < NEGLIGIBLE_MASS, the moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Tolerance per kg of mass (m^2) of two checks of the principal moments:
-#: no moment is negative, and none exceeds the sum of the other two.
-#: Only bodies with a radius of gyration below 0.03 mm have smaller moments.
+#: No principal moment may be negative or exceed the sum of the other two.
+#: The tolerance of these checks is this number (m^2) times the mass.
+#: A body with a mass of 1 kg and a radius of gyration of 0.03 mm has such a moment.
 NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of the moments of inertia in a file.
@@ -133,8 +133,8 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY_INCOMPLETE = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of each shape:
-#: name, count of numbers, and whether the attribute is required.
+#: Numeric attributes of each shape.
+#: A tuple contains the attribute's name, its count of numbers, and whether it is required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

@@ -95,8 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element and the name of an attribute.
-#: The name None means the element itself.
+#: An element, and the name of an attribute. If the name is None, the pair stands for the element.
 _ElementOrAttribute = tuple[Element, str | None]
 
 
@@ -159,9 +158,9 @@ _VENDOR_NAMES_TEXT = (
 )
 VENDOR_NAMES = frozenset(_VENDOR_NAMES_TEXT.split())
 
-#: Lines of the form `element: attributes > child elements`.
-#: If a line has no colon, the attributes of the element are not checked.
-#: If this table has no line for an element, the content of the element is not checked.
+#: Each line has the form `element: attributes > child elements`.
+#: The attributes of an element without a colon are not checked.
+#: Elements without a line are not checked.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -274,7 +273,7 @@ def _is_link_or_joint(element: Element) -> bool:
 
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
-#: Tags of this length or longer are not a misspelt `link` or `joint`.
+#: Only shorter tags can be a misspelt `link` or `joint`.
 _MISSPELT_LENGTH_BOUND = 8
 
 
@@ -372,7 +371,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribu
 
 
 def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix and the name of its attribute; the name is None for the tag's prefix."""
+    """Yield each namespace prefix, with the name of its attribute or with None for the tag's prefix."""
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

@@ -61,7 +61,7 @@ def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _check_loops_and_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Report loops, and links with several parent joints. Return True if the function reports nothing."""
+    """Report loops, and links with several parent joints. Return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
@@ -144,16 +144,15 @@ NOTE_LENGTH_ERROR = 2e-4
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: An axis with a small xy part and z > 0 counts as the z axis.
-#: The xy part is at most this fraction of the z component.
+#: An axis (x, y, z) counts as the z axis if z > 0 and |(x, y)| is at most this fraction of z.
 _Z_AXIS_TOLERANCE = 1e-9
 
-#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
+#: Pinocchio replaces an axis by a coordinate axis if their relative difference is at most this number.
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: Maximum angle (rad) between an axis and a coordinate axis that is not reported.
-#: The error bounds in `verify.bounds` cover this difference.
+#: If the angle (rad) between an axis and a coordinate axis is at most this number, it is not reported.
+#: The error bounds in `verify.bounds` cover this angle.
 _NEGLIGIBLE_TILT = 2.0**-52
 
 
@@ -225,7 +224,7 @@ def _check_snapped_axis(
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
     """Return, by joint name, the angle (rad) between the axis in the file and Pinocchio's axis.
 
-    A joint has no entry if Pinocchio keeps the axis, or rotates the axis by at most 2^-52 rad.
+    Joints with an angle of at most 2^-52 rad have no entry.
     """
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
@@ -234,7 +233,7 @@ def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
 
-    Return None if Pinocchio keeps the axis, or if the angle is at most `_NEGLIGIBLE_TILT`.
+    Return None if the angle is at most `_NEGLIGIBLE_TILT`.
     """
     if axis is None:
         return None
@@ -332,9 +331,9 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: A mimic joint's limits can exclude part of the mimicked joint's range.
-#: URDF527 reports parts above this fraction of the range.
-#: Limits with few digits often exclude a small fraction of the range.
+#: The limits of a mimic joint can exclude part of the mimicked joint's range.
+#: URDF527 reports an excluded part that is larger than this fraction of the range.
+#: Limits with few digits often exclude a smaller part.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -437,9 +436,8 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # `restrict_range` subtracts a rounding error at each end.
-        # A range of one value would become empty.
-        # Each end is therefore tested alone.
+        # `restrict_range` subtracts a rounding error at both ends of the range, so a range of one value
+        # becomes empty. Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -477,7 +475,7 @@ class _MimicChecker:
 def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
     """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
 
-    Return None for joints of other types, for a missing `<limit>`, and if lower >= upper.
+    Return None for other joint types, for a missing `<limit>`, and for lower >= upper.
     """
     if joint.kind == "continuous":
         return -math.pi, math.pi
@@ -514,7 +512,7 @@ NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If the longest chain of a robot is shorter (m), the lengths were probably scaled twice.
+#: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
 #: A limit is probably in degrees if it is a whole number, and
@@ -529,8 +527,7 @@ NOTICEABLE_DISPLACEMENT = 1e-3
 #: Maximum difference (rad) of an angle that counts as an exact k * pi.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs (k, minimum number of decimals of a rounded k * pi).
-#: Angles with fewer decimals do not count as rounded k * pi.
+#: Pairs (k, n). A rounded k * pi has at least n decimals.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -583,8 +580,8 @@ def _check_rounded(
 ) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
-    The message quotes the angle with the largest rounding error.
-    `condition` is the condition under which the links below are at most `reach` metres away.
+    The message quotes the angle with the largest rounding error. The distance to the links below is at most
+    `reach` (m) under the condition `condition`, a text for the message.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
@@ -625,9 +622,10 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 
 
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return k > 0 and the exact angle if `angle` is a rounded k * pi or -k * pi, otherwise None.
+    """Return k > 0 and the exact angle if `angle` is a rounded multiple of pi, otherwise None.
 
-    `text` is the angle as written in the file, and `angle` is the number (rad).
+    The exact angle is k * pi or -k * pi. `text` is the angle as written in the file, and `angle` is the
+    number (rad).
 
     >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -708,7 +706,10 @@ def _check_equal_joints(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return, for each link, the upper bound (m) on the distance of descendants if all translations are 0."""
+    """Return an upper bound (m) on each link's distance to its descendants, by link name.
+
+    The bounds assume that all translations of joints are 0.
+    """
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})
     for link in order:

@@ -39,7 +39,7 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Number of leading bytes of a file that are searched for the elements in findings.
+#: urdfkin searches for the elements of findings in this number of bytes from the beginning of a file.
 _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
@@ -59,7 +59,7 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: {(tag, name): (line, column, width)} for the beginning of each element or prim.
+#: Maps (tag, name) of an element or prim to (line, column, width) of its beginning.
 #: Lines and columns count from 1.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
@@ -135,8 +135,8 @@ def _find_positions(
 def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
     """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
 
-    An equality constraint without a name is named by its index. After an `<include>`, the index of a
-    constraint is unknown. Constraints without a name are then skipped.
+    An equality constraint without a name is identified by its index. After an `<include>`, the index is
+    unknown, so constraints without a name are skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
