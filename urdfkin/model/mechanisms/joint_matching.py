@@ -27,10 +27,13 @@ from typing import TypeVar
 
 import numpy as np
 
+from urdfkin.kinematics.rotation import exp_rotation, skew
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     PARALLEL_TOLERANCE,
+    Alignment,
+    AlignmentChoices,
     Edge,
     Mechanism,
     Screw,
@@ -39,9 +42,10 @@ from urdfkin.model.mechanisms.mechanism import (
     line_difference,
     pose_difference,
     screw_motion,
+    size_of,
     smallest_motion,
 )
-from urdfkin.model.tree import FloatArray, JointKind, inverse
+from urdfkin.model.tree import FloatArray, JointKind, inverse, pose
 
 EdgePair = tuple[Edge, Edge]
 PreviousEdges = tuple[Edge | None, Edge | None]
@@ -336,6 +340,58 @@ def later_axes(
             yield from later_axes(
                 mechanisms, (e, f), next_bodies, screws if axes[0].turns else reference_line
             )
+
+
+#: Number of Gauss-Newton steps. Two steps are usually enough. If axes are parallel up to 1e-8 rad, a step can
+#: change an angle by 1 rad, and more steps are necessary.
+_REFINEMENT_STEPS = 10
+
+
+def refine_choices(alignment: Alignment) -> AlignmentChoices:
+    """Solve for B's root pose and all zero offsets together, so that all axes of B coincide with axes of A.
+
+    The search computes one zero offset after another. If axes are nearly parallel, the error of one offset
+    displaces later axes by much more than the rounding error. All axes together determine the offsets well.
+
+    Args:
+        alignment: Every joint is revolute or prismatic, and the axes nearly coincide.
+    """
+    size, n = size_of(alignment.a, alignment.b), len(alignment.steps)
+    edges = {edge.joint: edge for edge in alignment.b.edges}
+    root_body = alignment.b.body_of[alignment.base[1]]
+    X, offsets = alignment.X, np.array([step.offset for step in alignment.steps])
+    for _ in range(_REFINEMENT_STEPS):
+        # For each joint pair: B's body after the joint, the body's motion, and its twists (6, 6 + n).
+        # The twists are in A's root frame. Columns 0 to 5 belong to B's root pose, the rest to zero offsets.
+        after = list[tuple[int, FloatArray, FloatArray]]()
+        root = root_body, X, np.eye(6, 6 + n)
+        J, r = np.zeros((n, 2, 3, 6 + n)), np.zeros((n, 2, 3))
+        for i, step in enumerate(alignment.steps):
+            body, motion, twists = after[step.previous] if step.previous >= 0 else root
+            edge, turns = edges[step.b], step.kind == "turns"
+            screw = alignment.b.screw(edge)
+            screw = screw.reverse() if edge.outer == body else screw
+            axis_b = screw.transform(motion)
+            u, p = axis_b.direction, axis_b.point
+            across = np.eye(3) - np.outer(step.axis_a.direction, step.axis_a.direction)
+            J[i, 0] = -size * step.sense * skew(u) @ twists[:3]
+            r[i, 0] = size * (step.sense * u - step.axis_a.direction)
+            if turns:
+                J[i, 1] = across @ (twists[3:] - skew(p) @ twists[:3])
+                r[i, 1] = across @ (p - step.axis_a.point)
+            twists = twists.copy()
+            twists[:, 6 + i] = np.concatenate((u, np.cross(p, u)) if turns else (np.zeros(3), u))
+            motion = motion @ screw_motion(screw, offsets[i], turns=turns)
+            after.append((edge.other_body(body), motion, twists))
+        # A rotation of 1 rad and a shift of `size` have about the same effect.
+        scales = np.ones(6 + n)
+        scales[3:6] = size
+        scales[6:] = [1.0 if step.kind == "turns" else size for step in alignment.steps]
+        change = scales * np.linalg.lstsq(J.reshape(-1, 6 + n) * scales, -r.ravel(), rcond=None)[0]
+        X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
+    joints = alignment.a.tree.joints
+    zeros = {joints[s.a].name: (s.sense, float(x)) for s, x in zip(alignment.steps, offsets, strict=True)}
+    return replace(alignment.choices, X=X, zeros=zeros)
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:

@@ -29,6 +29,7 @@ from urdfkin.model.mechanisms.joint_matching import (
     SubtreeMatcher,
     later_axes,
     motion_type,
+    refine_choices,
     root_poses_by_axes,
     root_poses_by_siblings,
     zero_candidates,
@@ -757,7 +758,9 @@ def align(
             if _is_better_alignment(candidate, best):
                 best = candidate
     return _with_zeros_by_mimic_rules(
-        _with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map)
+        _with_larger_tolerances(
+            _with_refined_axes(_with_exchanged_joints(best, name_map), name_map), name_map
+        )
     )
 
 
@@ -836,6 +839,26 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
             continue
         exact = _best_alignment(a, b, rough.names, rough.choices)
         return exact if exact.inner_difference_range[1] < BETTER_RATIO * most else best
+    return best
+
+
+def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
+    """Solve for the base pose of a table and all zero offsets together, if the axes do not agree.
+
+    The frames of a table do not determine zero offsets. If axes are nearly parallel, they determine the zero
+    offsets only together.
+    """
+    if best.all_joints_agree or not best.has_free_frames or best.only_a or best.only_b:
+        return best
+    a, b = best.a, best.b
+    size, look_ahead = size_of(a, b), LookAhead(MAX_LOOK_AHEAD_PAIRS)
+    for angle in LARGER_TOLERANCES:
+        tolerance = Tolerance(angle, angle * size)
+        rough = _best_alignment(a, b, name_map, None, look_ahead, tolerance, best.base)
+        if rough.all_joints_agree and all(step.kind in ("turns", "prismatic") for step in rough.steps):
+            exact = _best_alignment(a, b, rough.names, refine_choices(rough))
+            if exact.all_joints_agree:
+                return exact
     return best
 
 
