@@ -120,6 +120,7 @@ def drawn(count: int) -> list[Mutant]:
 
 
 @pytest.mark.long
+@pytest.mark.timeout(700)  # `evaluate` runs the tests in two rounds of at most 300 s
 @pytest.mark.parametrize("mutant", drawn(6), ids=lambda mutant: str(mutant.name))
 def test_a_random_mutant_is_detected_or_documented_as_harmless(mutant: Mutant) -> None:
     if (mutant.function, mutant.change) not in harmless_mutants():
