@@ -419,7 +419,7 @@ def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArr
 
     All joints must be revolute.
     The vector P_0 begins at the base's origin, and P_n ends at the tip's origin.
-    Solvers detect intersecting axes by an exactly zero vector.
+    The vector between two intersecting axes is exactly zero, because solvers test for zero.
 
     Returns:
         (n, 3) unit axes, and (n + 1, 3) vectors, m.

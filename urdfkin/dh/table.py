@@ -7,12 +7,13 @@ A table represents a product of two kinds of transforms (section 7.5 of the text
 
 The two conventions group these transforms differently into rows:
 
-    standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
-    modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
+    standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool
+    modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool
 
-The variable of row i is theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable
-is the constant in the row plus `sense` times the joint's value. The standard convention is the textbook's:
-z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+Row i contains S_i, and X_i in the standard convention or X_{i-1} in the modified convention. The variable of
+row i is theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable is the constant
+in the row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis
+of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 """
 
 from __future__ import annotations
@@ -292,8 +293,8 @@ class SnapReport:
             assumes that a prismatic joint without limits travels at most 10 m.
         radians: Guaranteed bound of the tip's rotation.
         per_metre: Increase of the bound per metre of travel, by prismatic joint.
-        measured_metres: Largest distance between the tips of the exact path and of the table, in samples.
-        measured_radians: Largest angle between these two tip frames, in samples.
+        measured_metres: Largest displacement of the tip in the sampled configurations.
+        measured_radians: Largest rotation of the tip in the sampled configurations.
         samples: Number of sampled configurations.
     """
 
@@ -481,7 +482,7 @@ class DHTable(Displayable):
     def unlimited(self) -> tuple[str, ...]:
         """Names of the prismatic joints without limits.
 
-        Bounds assume that these joints stay within 10 m of zero.
+        Error bounds assume that joints without limits stay within 10 m of zero.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").unlimited

@@ -9,8 +9,8 @@ frame i:
 
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
 child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table has
-the form of the modified Denavit-Hartenberg table. The parameter d is then called a(i-1) in the modified
-table, and the parameter r is called d(i). Frame 0, the last row and parallel axes follow other rules. The
+the form of the modified Denavit-Hartenberg table. The modified table writes a(i-1) instead of d, and d(i)
+instead of r. Frame 0, the last row and parallel axes follow other rules. The
 angle beta is not part of the original notation, and is zero unless two axes are nearly parallel. Without
 beta, nearly parallel axes may need offsets of kilometres (Hayati).
 """

@@ -1,6 +1,6 @@
 r"""Convert a table's numbers from text and to text, with fractions of pi, degrees or millimetres.
 
-A table object is always in metres and radians. Other units are used only when a table is read or written.
+A table object stores metres and radians. Other units are used only when a table is read or written.
 
 The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. A
 term of the sum is a number, a multiple of pi, or a multiple of a joint variable. A number or a multiple of pi
@@ -272,7 +272,7 @@ class _Term:
     """A term of a cell's sum.
 
     Attributes:
-        operator: The last token if "*" or "/", otherwise "".
+        operator: "*" or "/" at the end of the term so far, or an empty string.
     """
 
     sign: float = 1.0

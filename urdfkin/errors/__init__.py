@@ -182,7 +182,7 @@ class RangeError(InputError):
 class UnknownNameError(UrdfkinError, LookupError):
     """A name does not exist.
 
-    The message suggests similar existing names. If no name is similar, it lists up to six existing names.
+    The message suggests similar existing names. If no name is similar, the message lists up to six names.
 
     Attributes:
         name: The unknown name.

@@ -19,7 +19,7 @@ FORMULA_STARTS = ("=", "+", "-", "@")
 #: Group 1 is the character to escape.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 #: Patterns of commands in logs, for example `::error::`, of GitHub, Azure and TeamCity.
-#: GitHub's commands are at the beginning of a line.
+#: GitHub executes a command only at the beginning of a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
 #: Invisible character (word joiner).
@@ -102,7 +102,7 @@ def json_text(data: Any) -> str:
 def escape_sequence(c: str) -> str:
     """Return the escape sequence of a character in Python and TOML.
 
-    For characters up to U+FFFF, JSON has the same escape sequence.
+    JSON uses the same sequence for characters up to U+FFFF.
     """
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 

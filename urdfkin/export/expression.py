@@ -39,7 +39,7 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        operands: Nodes and constants, or an input's index.
+        operands: Operands of the operation, as nodes or constants. An input has one operand, its index.
         index: Number in the order of creation; operands have smaller numbers.
         step: Index of the recursion's step: first the joints, then the frame, then the results.
             The step of exact constants is -1.

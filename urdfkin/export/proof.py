@@ -56,9 +56,9 @@ class ExportVector:
     """One configuration with its true results.
 
     Attributes:
-        tolerances: Bounds in double precision, in eps.
-        single_tolerances: Bounds in single precision, in eps. Beyond the range of single precision, the value
-            is 0.0.
+        tolerances: Bounds in double precision, in eps = 2^-52.
+        single_tolerances: Bounds in single precision, in eps = 2^-23. The bound is 0.0 if single precision
+            overflows.
     """
 
     inputs: tuple[list[float], ...]
@@ -73,7 +73,7 @@ class Proof:
 
     Attributes:
         single_precision_bounds: Largest bound of each quantity, in eps * scale. The scale is an upper bound
-            on the sum of |term| over a number's terms. Beyond the range of single precision, a bound is inf.
+            on the sum of |term| over a number's terms. The bound is inf if single precision overflows.
         lock: Names and values of locked joints.
     """
 

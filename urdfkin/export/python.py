@@ -291,7 +291,7 @@ _EVALUATE_EACH = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
-        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}), whose batch axes broadcast.",
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}). Batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
         helpers=_make_input_check('x.dtype.kind not in "biuf"', numbers="real numbers"),
         first_lines=_numpy_first_lines,
@@ -334,8 +334,8 @@ DIALECTS = {
         values_body=_EVALUATE_EACH.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
-        "broadcast. The functions support jit, vmap and grad.\n"
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision. Batch axes broadcast.\n"
+        "The functions support jit, vmap and grad.\n"
         "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
@@ -360,8 +360,8 @@ DIALECTS = {
         has_single_precision=True,
     ),
     "torch": Dialect(
-        about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device,\n"
-        "whose batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
+        about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device.\n"
+        "Batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
         "Kinematics() is a torch.nn.Module with these functions.",
         imports="import torch\nfrom torch import {}",
         helpers=_make_input_check(

@@ -132,7 +132,7 @@ def _drop_tiny_entries(x: Sequence[float]) -> Vector:
     """Replace entries below the largest entry's rounding error by 0.
 
     Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
-    `urdfkin.kinematics.roundings` include this replacement.
+    `urdfkin.kinematics.roundings` account for the omitted entries.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]
@@ -201,7 +201,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
         case Reference.LOCAL | Reference.WORLD:
-            pass  # The components of both vectors already refer to the axes of the reference frame.
+            pass  # `linear` and `angular` are already expressed in the axes of the reference frame.
         case _:
             assert_never(reference)
     return [*linear, *angular]

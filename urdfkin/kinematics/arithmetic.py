@@ -38,8 +38,8 @@ def rebind_functions(
     The copies call other copies and the replacements.
 
     Args:
-        modules: A module comes after the modules from which it imports functions, for example
-            `recursion, outputs`.
+        modules: Modules in import order. For example, `outputs` imports from `recursion` and therefore
+            follows `recursion`.
         decorate: Decorator of each copy. A replacement of a copied function is not decorated.
         replacements: Functions or modules by name.
     """

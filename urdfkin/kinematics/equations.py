@@ -242,8 +242,9 @@ def derivative_by_earlier_joint(w, linear, angular):
 
 
 def derivative_by_later_joint(z, linear):
-    """7.85: derivative of joint i's vector z x d with respect to joint j > i.
+    """7.85: derivative of the linear part of column i with respect to joint j > i.
 
+    z:       axis of joint i
     linear:  linear part of column j
     """
     return cross(z, linear)

@@ -17,7 +17,8 @@ Intermediate = TypeVar("Intermediate")
 _MOST_STEPS = 100
 #: First, smallest and largest damping, relative to the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: Factor of the damping after a step that reduces the error, and factor after a rejected step.
+#: The damping is multiplied by the first factor after an accepted step.
+#: The damping is multiplied by the second factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
 #: A step is slow if new error > _SLOW_STEP_RATIO * old error.
 _SLOW_STEP_RATIO = 0.99
@@ -44,7 +45,7 @@ def least_squares(
         start: First state.
         residuals: Returns the residuals (n,) of a state, and a value for `derivatives`.
         derivatives: Returns the matrix with the entries -d(residual i)/d(parameter j).
-        move: Returns the state after a step (parameters,).
+        move: Applies a step (parameters,) to a state and returns the new state.
         max_step: Upper bound on the absolute value of each component of a step.
         patience: The search ends after this number of consecutive slow steps; 0 means no limit.
     """

@@ -537,7 +537,7 @@ MIN_SINGULARITY_DISTANCE = 1e-9
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     """Return Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    The columns are the rotation axes in frame 0.
+    The columns of Omega are the three rotation axes in frame 0.
     """
     axes = find_sequence(name)
     turns = axes.reorder(as_vectors(angles, "angles"))

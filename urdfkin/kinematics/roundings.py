@@ -254,12 +254,14 @@ SMALLEST_SUBNORMAL = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
-#: urdfkin and Pinocchio may differ by at most joints * factors * PINOCCHIO_ROUNDINGS * eps * scale.
-#: A tilt increases this limit. `joints` is the number of joints of the path plus one, or plus two for a
-#: rotated base. The docstring above derives these rules.
+#: Without tilts, this is the allowed difference between urdfkin and Pinocchio:
+#:     `joints * factors * PINOCCHIO_ROUNDINGS * eps * scale`
+#: `joints` is the number of joints of the path plus one, or plus two for a rotated base.
 #: `factors` is the number of factors of a term. For example, the term w x (w x d) has three factors.
+#: The docstring above derives these rules.
 PINOCCHIO_ROUNDINGS = 24.0
-#: urdfkin and MuJoCo may differ by at most joints * factors * MUJOCO_ROUNDINGS * eps * scale.
+#: This is the allowed difference between urdfkin and MuJoCo:
+#:     `joints * factors * MUJOCO_ROUNDINGS * eps * scale`
 #: `joints` is the same number as for Pinocchio.
 #: `factors` is 2 * (`factors` for Pinocchio).
 #: A term has more factors because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
@@ -330,27 +332,26 @@ SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: The second rotation is a product of three rotations.
 #: The product's error is the sum of four errors.
 #: The sines and the cosines have an error of 0.5 each.
-#: The two matrix multiplications have the errors 1.4 and 1.8.
+#: The first matrix multiplication has an error of 1.4, and the second of 1.8.
 ROTATION_ROUNDINGS = 8.0
 
 #: Allowed error (in eps) of a mimicked joint's computed limit.
 #: urdfkin computes this limit from a mimic joint's limit.
 #: The computed limit is (limit of the mimic joint - offset) / multiplier: a subtraction and a division.
 #: The mimic rule has a multiplication and an addition.
-#: Each of these four operations has an error of 0.5.
-#: The sum of the four errors is 2.0.
+#: Each of these four operations has an error of 0.5, so the sum is 2.0.
 #: urdfkin narrows the range of the mimicked joint at each end by twice this sum.
-#: The mimic joint's limits then accept both ends.
+#: Therefore, the mimic joint's limits accept both ends of the narrowed range.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference between urdfkin and Pinocchio for `factors` = 1, in eps.
 
-        PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps
+        `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 
-    `joints` is the number of joints of the path plus the additional joints that the caller counts, for
-    example 1 as for `PINOCCHIO_ROUNDINGS`. `tilt` is the sum of the tilts (rad) of the path's joints.
+    `joints` is usually the number that `PINOCCHIO_ROUNDINGS` defines. `tilt` is the sum of the tilts (rad) of
+    the path's joints.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]

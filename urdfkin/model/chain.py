@@ -74,7 +74,7 @@ class FrameChain(Displayable):
         joints: The moving joints in path order.
         T_last_tip: (4, 4) pose of the tip in the last joint's frame; in the base frame if `joints` is empty.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
-            upper bound on the translation in A_k. Other rotations of the fixed joints give the same bound.
+            upper bound on the translation in A_k. The bound does not depend on the fixed joints' rotations.
         pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.
 
     >>> import urdfkin

@@ -108,10 +108,10 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with one coordinate, within -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`.
+    """Return the range of each joint that has one coordinate.
 
-    If the limits exclude this interval, the range begins at the limit nearest to 0, with at most the length
-    `ASSUMED_LIMIT`. Limits of mimic joints are ignored.
+    A range is limited to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. A range outside this interval
+    is limited to the length `ASSUMED_LIMIT`, from its end nearest to 0. Limits of mimic joints are ignored.
     """
 
     def own_range(joint: Joint) -> tuple[float, float]:

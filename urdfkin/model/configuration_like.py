@@ -49,7 +49,7 @@ class CoordinateLayout:
     Attributes:
         symbol: "q", "v" or "a".
         units: "rad", "m", "" without unit, or None if unknown.
-        spans: First index and count, for joints with several numbers.
+        spans: First index and number of coordinates of each joint that has several coordinates.
         hints_by_name: For errors about a joint without a coordinate: hints by the joint's name.
         hints_by_length: Hints for wrong lengths.
     """
@@ -238,7 +238,7 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
 
 
 def _labels(value: object) -> list[Any]:
-    """The labels 0, 1, 2, ... count as no labels."""
+    """Return a table's labels; the default labels 0, 1, 2, ... are ignored."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []

@@ -127,7 +127,9 @@ def equations_page() -> str:
         head = "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
         rows = "\n".join(map(_row, section.equations))
         parts += [f"## {section.number} {section.title}", head + rows]
-    introduction = "These statements in the chapter are wrong or incomplete. A test proves each correction."
+    introduction = (
+        "This section lists wrong or incomplete statements of chapter 7. A test proves each correction."
+    )
     return "\n\n".join([*parts, "## Misprints", introduction, *map(_misprint, misprints())]) + "\n"
 
 

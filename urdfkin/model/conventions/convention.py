@@ -161,7 +161,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse a convention's TOML text.
 
-    `name` is the convention's name and title, unless the text contains them.
+    `name` is the default for the convention's name and title.
     """
     try:
         entries = tomllib.loads(text)
@@ -272,9 +272,8 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _BASE_62_DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: An encoded number is a sequence of characters of `_BASE_62_DIGITS`.
-#: The last character has an index in `_BASE_62_DIGITS` below this number.
-#: All other characters have at least this index.
+#: An encoded number consists of digits of base 62.
+#: The last digit is less than this number. All other digits are at least this number.
 _PUNYCODE_THRESHOLD = 31
 
 

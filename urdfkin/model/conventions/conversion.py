@@ -162,7 +162,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The URDF text does not contain a root joint that urdfkin added. The rank -1 puts this joint first.
+        # The URDF text does not contain a root joint that urdfkin added. The rank -1 sorts the root joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
