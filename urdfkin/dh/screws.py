@@ -94,7 +94,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def body(self) -> FloatArray:
-        """(n, 6) screws in the tip frame: B = Ad(M^-1) S.
+        """(n, 6) screws B = Ad(M^-1) S in the tip frame.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").body[1].tolist()
@@ -286,7 +286,7 @@ def screws_from_rows(
 
     Args:
         screws: (n, 6) rows (w, v); also (6, n) if n is not 6.
-        M: (4, 4) or (3, 4) pose of the tip in the zero configuration, m.
+        M: (4, 4) or (3, 4) pose of the tip in the zero configuration, with the translation in m.
         frame: Frame of the screws: "space" (base) or "body" (tip).
         joints: Joint names.
         robot: The robot's name.

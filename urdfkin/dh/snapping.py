@@ -225,9 +225,9 @@ def _changes_of_origins(
 
 
 def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """The change rotates the rest of the chain about the origin of joint k.
+    """Describe a rotation of the rest of the chain about the origin of joint k.
 
-    k is 0 for the base, 1 for the first joint, and n + 1 for the tip.
+    The base has k = 0, the first joint has k = 1, and the tip has k = n + 1.
     """
     prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)

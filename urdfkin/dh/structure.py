@@ -168,7 +168,7 @@ def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -
     """Return the least-squares intersection of axes.
 
     Returns:
-        The point, and its largest distance to an axis (m).
+        The point (3,), and the largest distance (m) between the point and an axis.
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
@@ -311,9 +311,11 @@ class OpwParameters:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return base . F(sign * q - offset) . tool.
+        """Return the pose of the tip in the base frame.
 
-        F is the solver's forward kinematics.
+        F is the solver's forward kinematics, and the pose is:
+
+            `base F(sign * q - offset) tool`
         """
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()

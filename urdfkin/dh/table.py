@@ -10,10 +10,10 @@ The two conventions group these transforms differently into rows:
     standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool
     modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool
 
-Row i contains S_i, and X_i in the standard convention or X_{i-1} in the modified convention. The variable of
-row i is theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable is the constant
-in the row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis
-of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+Row i contains S_i and one X: X_i in a standard table, X_{i-1} in a modified table. The variable of row i is
+theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable is the constant in the
+row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis of
+joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class DHRow:
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
         beta: Rotation about y after alpha; 0 except in a Hayati row.
-        mimic: The mimic rule; None if the joint has its own coordinate.
-        limit: The joint's limits; None without limits.
+        mimic: The mimic rule, or None for an independent joint.
+        limit: The joint's limits, or None.
 
     Raises:
         InputError: a number is not finite, `sense` is neither 1 nor -1, or the joint is fixed, planar or

@@ -8,11 +8,11 @@ frame i:
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
-child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table has
-the form of the modified Denavit-Hartenberg table. The modified table writes a(i-1) instead of d, and d(i)
-instead of r. Frame 0, the last row and parallel axes follow other rules. The
-angle beta is not part of the original notation, and is zero unless two axes are nearly parallel. Without
-beta, nearly parallel axes may need offsets of kilometres (Hayati).
+child of link i. Therefore, gamma and b of the first moving child are zero. For a chain without branches, the
+table has the form of the modified Denavit-Hartenberg table. The modified table writes a(i-1) instead of d,
+and d(i) instead of r. Frame 0, the last row and parallel axes follow other rules. The angle beta is not part of
+the original notation, and is zero unless two axes are nearly parallel. Without beta, nearly parallel axes may
+need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class TreeParameters:
         """Return the path lengths from the root to the links at `q`.
 
         Returns:
-            (..., joints) lengths (m), the larger of the URDF's and the table's.
+            (..., joints) lengths (m). Each entry is the larger of the URDF's length and the table's length.
         """
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
@@ -213,9 +213,8 @@ class _LinkAxis:
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return each link's axis frame; for a fixed joint, the link's URDF frame."""
     links = list[_LinkAxis]()
-    # The list has an entry for each link: (i, T_i_link, number of fixed joints from link i to the link).
-    # A moving link has its own index i.
-    # For all other links, i is the index of the antecedent.
+    # Each link has an entry: an index i, the pose T_i_link, and the number of fixed joints from link i to the
+    # link. For a moving link, i is the link's own index. For all other links, i is the antecedent's index.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]

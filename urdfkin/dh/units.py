@@ -32,7 +32,7 @@ class LengthUnit(StrEnum):
 
 
 #: A row that is a list has its cells in this order.
-#: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
+#: Craig's book uses the order alpha, a, d, theta. The Robotics Toolbox uses theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
 _MAX_CELL_LENGTH = 200
@@ -206,9 +206,9 @@ class Cell:
 
     Attributes:
         number: The constant, in `unit`.
-        unit: "rad" (also with pi), "deg", "m" or "mm"; None: the table's unit.
-        variable_factor: Factor of the variable; None without variable.
-        variable: Number in the variable's name, 2 for q2.
+        unit: "rad" (also with pi), "deg", "m" or "mm". None means the table's unit.
+        variable_factor: Factor of the variable, or None if the cell has no variable.
+        variable: Number in the variable's name, for example 2 for q2.
         text: Text of the constant, such as "90", if the constant is a single number; otherwise "".
     """
 

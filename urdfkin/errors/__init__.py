@@ -1,7 +1,7 @@
 """Exceptions of urdfkin.
 
-A message states the problem, the place, the wrong value and the remedy. Each part is also an attribute of the
-exception.
+A message states the problem, the place, the wrong value and the remedy. The exception has an attribute for
+each part of the message.
 """
 
 from __future__ import annotations
@@ -107,11 +107,11 @@ class UrdfkinError(Exception):
     """Base class of all exceptions that urdfkin raises intentionally.
 
     Attributes:
-        what: The problem in one clause, without a full stop.
-        where: Place of the problem: a line of a file, a frame, or a sample; None: unknown.
+        what: The problem without a full stop, such as "a length is negative".
+        where: Place of the problem: a line of a file, a frame or a sample. None means unknown.
         found: The wrong value, or a description of it, such as "shape (1,)".
         remedy: Instruction for the user.
-        question: Section of docs/questions.md; the message ends with the command that prints the section.
+        question: Section of docs/questions.md. The message ends with the command that prints the section.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
 
     >>> error = UrdfkinError("a length is negative", where="arm.urdf:3", found="-1", remedy="remove the sign")
@@ -253,10 +253,10 @@ class RepresentationSingularityError(InputError):
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
         super().__init__(
-            f"the Euler angles {sequence} are at their representational singularity, or too near to it: "
-            "at the singularity, some angular velocities correspond to no angle rates",
+            f"the Euler angles {sequence} are too near to their representational singularity, where some "
+            "angular velocities correspond to no angle rates",
             where=f"sample {list(sample)}" if sample else None,
-            found=f"a middle angle {distance:.3g} rad from it",
+            found=f"a middle angle {distance:.3g} rad from the singularity",
             remedy="describe the orientation by another sequence or by a quaternion",
         )
         self.sequence = sequence

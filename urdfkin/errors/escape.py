@@ -1,7 +1,7 @@
 """Escaping of names from files: one function for each output format.
 
 A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
-spreadsheet formulas. Each function replaces such characters by readable escapes.
+spreadsheet formulas. Each function escapes these parts of a name for one format.
 """
 
 from __future__ import annotations

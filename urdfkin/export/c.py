@@ -94,7 +94,7 @@ def parameter_list(function: Function, real: str) -> str:
 
 
 def _declarations(code: FrameCode) -> Iterator[str]:
-    yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
+    yield "/* A function writes its result to `out`, row by row. A batch has n consecutive configurations. */"
     for function in code.functions:
         declared = parameter_list(function, f"{code.name.upper()}_REAL")
         yield f"/* {describe_result(function)} */"

@@ -56,7 +56,7 @@ def insert_seal(text: str) -> str:
 
 
 def _has_valid_seal(text: str) -> bool | None:
-    """Return whether the digest is correct; None without a digest."""
+    """Return whether the digest is correct, or None if the text has no digest."""
     text = text.replace("\r\n", "\n")
     if (found := _SEAL_LINE.search(text)) is None:
         return None

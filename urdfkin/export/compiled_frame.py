@@ -442,9 +442,8 @@ class CompiledFrame:
         def compute_block(block_inputs: Sequence[FloatArray], block_out: FloatArray) -> int:
             arguments = _ArgumentArray()
             arguments[_N], arguments[_OUT] = len(block_out), address(block_out)
-            # The code writes eight numbers at once.
-            # Therefore, the code may write up to seven numbers beyond the results.
-            # The buffer `stage` has space for these additional numbers.
+            # The code writes eight numbers at once, and up to seven numbers after the last result.
+            # The buffer `stage` has space for these seven numbers.
             stage = (
                 aligned_empty(LANES * block_out[0].size + LANES)
                 if row.has_columns and uses_buffer(out)

@@ -166,7 +166,7 @@ def compare_with_pinocchio(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    # `Robot.certificate` must not count these checks, so a copy of the verifier makes them.
+    # Use a copy of the verifier, because `Robot.certificate` must not count the checks of exported code.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
     for function in functions:
@@ -235,7 +235,7 @@ def _tolerances_and_scales(
 def format_decimal(x: Number) -> str:
     """Return an interval's midpoint as decimal text, at most `REFERENCE_DIGITS` digits.
 
-    If the interval contains 0, the text is "0.0".
+    Return "0.0" for an interval that contains 0.
     """
     ball = as_interval(x)
     if ball.contains(0):

@@ -26,7 +26,7 @@ class Dialect:
     """The code for one Python library.
 
     Attributes:
-        result: Yields the lines that return the results.
+        result: Generator of the code lines that return the results.
         imports: Import lines. `{}` is replaced by the needed functions, such as `cos, sin`.
         values_body: Body of the exported function `_values`.
             `_values` evaluates a function at several configurations.
@@ -115,7 +115,7 @@ def _input_check_lines(writer: Writer, namespace: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Make a `Dialect.first_lines` that checks the inputs' lengths."""
+    """Return a `first_lines` function, which makes code that checks the inputs' lengths."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -334,8 +334,8 @@ DIALECTS = {
         values_body=_EVALUATE_EACH.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision. Batch axes broadcast.\n"
-        "The functions support jit, vmap and grad.\n"
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision.\n"
+        "Batch axes broadcast. The functions support jit, vmap and grad.\n"
         "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",

@@ -33,9 +33,9 @@ class NumberKind:
 
     Attributes:
         chapter: The textbook's equations.
-        begin_step: Called with the step's index before each step.
-            The steps are the joints 0 to n - 1, the frame (n) and the results (n + 1).
-        end_step: Called with the step's index after the steps 0 to n.
+        begin_step: Callback before each step, with the step's index as its argument.
+            The steps are the joints (0 to n - 1), the frame (n) and the results (n + 1).
+        end_step: Callback after each joint and after the frame, with the step's index and the link's state.
     """
 
     chapter: Any
@@ -50,7 +50,7 @@ class TreeRecursion(Recursion):
 
     Attributes:
         inputs: Numbers q, v and a; zeros if unused.
-        own_axes: Whether vectors use each link's own axes.
+        own_axes: True if each link's vectors are expressed in the link's own axes.
         turns: Rotation matrices from each frame to the previous frame.
         end: State of the frame.
     """

@@ -275,7 +275,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Convert the tool's velocity to frame n (7.115)."""
+    """Convert the tool's velocity to the velocity of frame n (7.115)."""
     return tool_velocity(velocity, -as_vectors(d_n_tool, "d_n_tool"))
 
 

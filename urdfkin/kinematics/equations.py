@@ -130,7 +130,7 @@ def tangential(w, d):
 def point_velocity(vel, w, d):
     """7.59, 7.115, 7.128: velocity of a point Q of a link.
 
-    Point P has the velocity vel; the vector d leads from P to Q.
+    Point P has the velocity vel. The vector d leads from P to Q.
     """
     return plus(vel, tangential(w, d))
 
@@ -171,7 +171,7 @@ def angular_acceleration(alpha, w, z, v, a):
 def point_acceleration(acc, alpha, w, d):
     """7.123, 7.130: acceleration of a point Q of a link.
 
-    Point P has the acceleration acc; the vector d leads from P to Q.
+    Point P has the acceleration acc. The vector d leads from P to Q.
     """
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
@@ -206,7 +206,10 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85: column [z x d; z]; d leads from the joint to the frame."""
+    """7.80, 7.85: column [z x d; z] of a revolute joint.
+
+    The vector d leads from the joint to the frame.
+    """
     return cross(z, d), z
 
 
@@ -230,7 +233,8 @@ def rate_in_turning_axes(rate, w, x):
 
 
 # -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
-# Time derivative of column i (7.126): sum over all joints j of d(column i)/dq_j * v_j
+# The time derivative of column i is a sum over all joints j (7.126):
+#     `d(column i)/dq_j * v_j`
 
 
 def derivative_by_earlier_joint(w, linear, angular):

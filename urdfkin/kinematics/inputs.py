@@ -98,7 +98,7 @@ def as_rotations(value: ArrayLike, name: str) -> FloatArray:
 def rotation_defect(R: FloatArray) -> FloatArray:
     """Return the largest absolute entry of R R^T - I.
 
-    A computed determinant <= 0 or an overflow gives inf.
+    Return inf if the determinant is not positive or R R^T overflows.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))

@@ -43,11 +43,11 @@ def least_squares(
 
     Args:
         start: First state.
-        residuals: Returns the residuals (n,) of a state, and a value for `derivatives`.
-        derivatives: Returns the matrix with the entries -d(residual i)/d(parameter j).
+        residuals: Computes the residuals (n,) of a state, and a value that is passed to `derivatives`.
+        derivatives: Computes the negative derivatives (n, parameters) of the residuals.
         move: Applies a step (parameters,) to a state and returns the new state.
         max_step: Upper bound on the absolute value of each component of a step.
-        patience: The search ends after this number of consecutive slow steps; 0 means no limit.
+        patience: Largest number of consecutive slow steps. 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

@@ -34,11 +34,11 @@ velocity in the fixed frame 0, as in the textbook. With `frame="body"`, function
 in the body's own frame. Quaternion rates have no singularity. `integrate_orientation` integrates quaternion
 rates, because the integral of the angular velocity is not an orientation (example 7.3).
 
-Euler angles have 24 sequences. A name has three letters, in the order of the angles. Capital letters are axes
-that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the
-URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. A distance of `nearest` or less from
-the singularity raises RepresentationSingularityError. The functions for Euler angles express angular
-velocities in the fixed frame 0.
+Euler angles have 24 sequences. The three letters of a sequence are the axes of the three angles. Capital
+letters are axes that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes:
+"xyz" is the URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. A distance of
+`nearest` or less from the singularity raises RepresentationSingularityError. The functions for Euler angles
+express angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -507,8 +507,7 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
     # F, S and T are rotations about the three axes.
     # R = F S T, so F^T R = S T.
-    # S turns about axis `j`.
-    # Therefore, S T and T have the same row `j`.
+    # S is a rotation about axis `j`. Therefore, row `j` of S T is row `j` of T.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
     # Row `j` has nonzero entries only for the second axis and `rest`.

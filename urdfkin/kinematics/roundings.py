@@ -263,7 +263,7 @@ PINOCCHIO_ROUNDINGS = 24.0
 #: This is the allowed difference between urdfkin and MuJoCo:
 #:     `joints * factors * MUJOCO_ROUNDINGS * eps * scale`
 #: `joints` is the same number as for Pinocchio.
-#: `factors` is 2 * (`factors` for Pinocchio).
+#: `factors` is twice the number of factors for Pinocchio.
 #: A term has more factors because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
@@ -297,7 +297,7 @@ SINGLE_POLYNOMIAL_ERROR = 1.0
 #: 13.7 eps / 2.4 eps = 5.7.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Rounding errors in the directions of two joint axes, in eps.
-#: Each axis: 0.5 from the division by its length, and 2.0 from Rodrigues' formula.
+#: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
 AXIS_ROUNDINGS = 5.0
 #: Error of the angle between consecutive axes, in eps per joint.
 #: Angles in a file are rounded.
@@ -340,7 +340,7 @@ ROTATION_ROUNDINGS = 8.0
 #: The computed limit is (limit of the mimic joint - offset) / multiplier: a subtraction and a division.
 #: The mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5, so the sum is 2.0.
-#: urdfkin narrows the range of the mimicked joint at each end by twice this sum.
+#: urdfkin moves each end of the mimicked joint's range inwards by 4.0, twice the sum.
 #: Therefore, the mimic joint's limits accept both ends of the narrowed range.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
@@ -382,7 +382,7 @@ def written_urdf_roundings(rows: int) -> float:
 
 
 def fitted_table_roundings(rows: int) -> float:
-    """Return the allowed difference (eps) between the poses of a URDF and of the table fitted to the URDF.
+    """Return the allowed difference (eps) between a URDF's pose and the pose of its fitted table.
 
     After the last iteration of the fit, the error of the pose is at most 12.5 * table_roundings(rows).
     """

@@ -55,7 +55,10 @@ class BaseMotion:
             _ = self.batch_shape
         except ValueError:
             shapes = f"{self.placement.shape}, {self.velocity.shape}, {self.acceleration.shape}"
-            raise InputError("the batch shapes of the base's fields do not broadcast", found=shapes) from None
+            raise InputError(
+                "the batch shapes of the base's placement, velocity and acceleration do not broadcast",
+                found=shapes,
+            ) from None
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
             raise InputError("the last row of the base's placement must be 0 0 0 1")
         R = nearest_rotation(self.placement[..., :3, :3], "the rotation of the base's placement")

@@ -45,9 +45,9 @@ class ChainJoint:
 
     Attributes:
         backwards: Whether the path leads from child to parent.
-        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. Its z axis is the joint's axis. If
-            `backwards` is true, z has the opposite direction.
-        mimic: None for an independent joint.
+        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. The z axis of the pose is the joint's axis,
+            or the reversed axis if `backwards` is true.
+        mimic: The mimic rule, or None for an independent joint.
     """
 
     name: str
@@ -242,7 +242,7 @@ class FrameChain(Displayable):
     def interorigin(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the interorigin vectors (..., n, 3) in the base frame, m.
 
-        The vector d_{i-1,i} leads from O_{i-1} to O_i. The last vector leads to the tip. Without `q`, the
+        The vector d_{i-1,i} leads from O_{i-1} to O_i. O_n is the origin of the tip. Without `q`, the
         configuration is zero.
 
         >>> import urdfkin
@@ -267,8 +267,8 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
-            # Before the motion is a rotation to the axis. The rotation and the pose each count as one pose.
+            # On a path from child to parent, a rotation to the joint's axis comes first. The joint's motion
+            # and the joint's constant pose follow. The rotation and the pose each count as one pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

@@ -178,7 +178,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     # Move each end inwards by the rounding error, so that the mimic joint is within its limits.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # With only one limit, `size` and `error` are infinite.
+    if not math.isfinite(error):  # A mimic joint with only one limit has an infinite `size`.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -193,7 +193,8 @@ def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: `from_pinocchio` allows a deviation from a mimic rule of this number * max(1, largest |value|).
+#: `from_pinocchio` allows this deviation of a mimic joint's values from the mimic rule:
+#:     `_MIMIC_TOLERANCE * max(1, largest absolute value)`
 _MIMIC_TOLERANCE = 1e-9
 
 

@@ -34,8 +34,11 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """One coordinate or one joint velocity of the target program.
 
-    The value is y = factor * x[index] + zero, where x is urdfkin's q or v.
-    If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y).
+    With urdfkin's q or v as x, the value is:
+
+        `y = factor * x[index] + zero`
+
+    If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y) instead.
     """
 
     name: str
@@ -162,7 +165,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The URDF text does not contain a root joint that urdfkin added. The rank -1 sorts the root joint first.
+        # A root joint that urdfkin added is not in the URDF text. The rank -1 sorts the root joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -733,7 +736,7 @@ class Conversion:
             quantity: For example "velocity".
             inputs: q, v and a in urdfkin's convention, as far as the quantity needs them.
             result: The quantity in urdfkin's convention.
-            jacobian: Returns the Jacobian; called only for "jacobian rate" and "hessian".
+            jacobian: Computes the Jacobian, which only "jacobian rate" and "hessian" need.
 
         Raises:
             InputError: No convention defines the quantity.
@@ -847,7 +850,7 @@ def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int
 
 
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Return indices k for which x_tool[..., k] has the order of urdfkin's q or v.
+    """Return the indices that reorder the target program's q or v as urdfkin's q or v.
 
     The index of a mimic joint is used only if the mimicked joint has no coordinate in the target program.
     """
