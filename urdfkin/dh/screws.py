@@ -65,8 +65,8 @@ class ProductOfExponentials(Displayable):
     Attributes:
         joints: The joints, base to tip.
         M: (4, 4) pose of the tip in the base frame, in the zero configuration (metres).
-        space: (n, 6) screws (w, v) in the base frame. Revolute: w in rad/rad, v in m/rad. Prismatic: w = 0,
-            v in m/m.
+        space: (n, 6) screws (w, v) in the base frame. The units for a revolute joint are rad/rad and m/rad.
+            For a prismatic joint, w is 0 and v is in m/m.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
@@ -170,7 +170,8 @@ class ProductOfExponentials(Displayable):
     def roundings(self) -> float:
         """Bound of the rotation's rounding error in `placement`, in units of eps.
 
-        The bound is twice that of a Denavit-Hartenberg table of the path. Rounding of q is not included.
+        The bound is twice the bound for a Denavit-Hartenberg table of the path. The bound does not include
+        the rounding of q.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000

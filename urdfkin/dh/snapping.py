@@ -38,7 +38,7 @@ from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, lar
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: Largest permitted tolerance, rad.
-#: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
+#: Below 7.5 degrees, only one multiple of 15 degrees can be within the tolerance of an angle.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
@@ -64,7 +64,7 @@ def snap_chain(
     """Snap the angles of a chain.
 
     Returns:
-        The chain, and a pair (k, change) for each change of a constant pose A_k.
+        The snapped chain, and a pair (k, change) for each changed pose A_k.
     """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
@@ -90,7 +90,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A prismatic axis may have been shifted to the origin of the previous joint.
+            # The table can contain a prismatic axis that was shifted to the origin of the previous joint.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_make_change(exact, pivot, what, angle), row=i))
@@ -154,7 +154,7 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
 
 
 def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
-    """Snap the angles of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Snap roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
     # In gimbal lock, only roll + yaw or roll - yaw is defined.
@@ -170,7 +170,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     """Snap the angles of Rz(phi) Rx(tilt) Rz(psi).
 
     Returns:
-        The new pose, and the angle from the old to the new rotation (rad).
+        The new pose, and the angle (rad) between the old and the new rotation.
     """
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])

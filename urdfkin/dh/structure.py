@@ -94,7 +94,7 @@ class StructureKind:
 class Structure:
     """The geometric structure of a path.
 
-    `reach` and `sampled_reach` are distances of the tip from `reach_from`.
+    `reach` and `sampled_reach` are distances between the tip and `reach_from`.
     Prismatic joints without limits are sampled within `ASSUMED_LIMIT`.
 
     Attributes:
@@ -102,7 +102,7 @@ class Structure:
         freedoms: Rank of the Jacobian at a random configuration.
         reach: Upper bound (m) within the joint limits; infinite if a prismatic joint has no limits.
         sampled_reach: Largest sampled distance, m.
-        reach_from: Point in the base frame (m), independent of q.
+        reach_from: Point (m) in the base frame that does not depend on q.
         reach_point: Description of `reach_from`.
     """
 
@@ -296,7 +296,7 @@ def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray
 class OpwParameters:
     """The OPW parameters of an arm.
 
-        q_opw = sign * q - offset
+    The solver's joint values are `q_opw = sign * q - offset`.
 
     Attributes:
         base: T_base_opw.

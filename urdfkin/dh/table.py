@@ -170,7 +170,7 @@ _RIGID_TOLERANCE = 1e-6
 
 
 def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """Return S = Rz(theta) Tz(d); radians and metres.
+    """Return S = Rz(theta) Tz(d), with theta in radians and d in metres.
 
     Returns:
         (..., 4, 4) poses; the arguments broadcast.
@@ -186,7 +186,7 @@ def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
 
 
 def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
-    """Return X = Tx(a) Rx(alpha) Ry(beta); metres and radians."""
+    """Return X = Tx(a) Rx(alpha) Ry(beta), with a in metres and both angles in radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
         [
@@ -282,17 +282,17 @@ class SnapChange:
 class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
-    Each change rotates the rest of the chain about a joint's origin:
+    Each change rotates the rest of the chain about a joint's origin, and moves the tip by at most:
 
-        displacement of the tip <= sum of angle * distance from this origin to the tip
+        `angle * distance from the joint's origin to the tip`
 
     Attributes:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
-        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits. The bound
-            assumes that a prismatic joint without limits travels at most 10 m.
+        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits, and
+            within 10 m of zero for a prismatic joint without limits.
         radians: Guaranteed bound of the tip's rotation.
-        per_metre: Increase of the bound per metre of travel, by prismatic joint.
+        per_metre: For each prismatic joint, the increase of the bound per metre of travel.
         measured_metres: Largest displacement of the tip in the sampled configurations.
         measured_radians: Largest rotation of the tip in the sampled configurations.
         samples: Number of sampled configurations.
@@ -337,7 +337,7 @@ class DHTable(Displayable):
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        snap: The effect of rounded angles; None for an exact table.
+        snap: The effect of snapped angles, or None for an exact table.
 
     Raises:
         InputError: the convention is unknown, two rows name the same joint, or base or tool is not a rigid

@@ -10,9 +10,9 @@ frame i:
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
 child of link i. Therefore, gamma and b of the first moving child are zero. For a chain without branches, the
 table has the form of the modified Denavit-Hartenberg table. The modified table writes a(i-1) instead of d,
-and d(i) instead of r. Frame 0, the last row and parallel axes follow other rules. The angle beta is not part of
-the original notation, and is zero unless two axes are nearly parallel. Without beta, nearly parallel axes may
-need offsets of kilometres (Hayati).
+and d(i) instead of r. These rules do not apply to frame 0, the last row and parallel axes. The original
+notation has no angle beta. The angle is zero unless two axes are nearly parallel. Without beta, nearly
+parallel axes may need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class TreeParameters:
     Attributes:
         path_lengths: (joints,) path lengths from the root to the joint origins in the URDF, m.
         T_frame_link: (joints, 4, 4) poses of the URDF link frames in the rows' frames.
-        zeroed_tilt: Largest sum of the tilts set to zero on a path from the root, rad.
+        zeroed_tilt: Largest sum (rad) of the zeroed tilts along a path from the root.
     """
 
     robot: str
@@ -200,7 +200,7 @@ class _LinkAxis:
     Attributes:
         T_antecedent_axis: Pose in the antecedent's axis frame.
         T_link_axis: Pose in the link's URDF frame.
-        zeroed_tilt: Sum of the tilts set to zero on the path from the root, rad.
+        zeroed_tilt: Sum (rad) of the zeroed tilts along the path from the root.
     """
 
     antecedent: int

@@ -209,7 +209,8 @@ class Cell:
         unit: "rad" (also with pi), "deg", "m" or "mm". None means the table's unit.
         variable_factor: Factor of the variable, or None if the cell has no variable.
         variable: Number in the variable's name, for example 2 for q2.
-        text: Text of the constant, such as "90", if the constant is a single number; otherwise "".
+        text: Text of a constant that is a single number, such as "90". For other constants, the text is
+            empty.
     """
 
     number: float

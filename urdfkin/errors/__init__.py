@@ -27,8 +27,8 @@ def find_similar_names(
 ) -> list[str]:
     """Return up to three known names that are similar to `word`, the most similar first.
 
-    The comparison ignores case and reads only the first 128 characters of a name. `cutoff` is the least
-    similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends before it compares more than
+    The comparison ignores case and reads only the first 128 characters of a name. A returned name has at
+    least the similarity `cutoff`, from 0 to 1, as in `difflib.get_close_matches`. The search compares at most
     `work` pairs of characters.
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])

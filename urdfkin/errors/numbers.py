@@ -80,7 +80,7 @@ class ParsedNumber(NamedTuple):
     """A parsed number; a number with a unit is converted to radians or metres.
 
     Attributes:
-        unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
+        unit: "rad", "m", or None for a number without a unit. A multiple of pi without a unit is in radians.
         seconds_exponent: Exponent of the seconds in the denominator of the unit: 1 for rad/s, 2 for rad/s^2.
     """
 

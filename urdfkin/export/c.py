@@ -159,7 +159,8 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 class InputLayout:
     """Layout of the C array `in`.
 
-    Order: other inputs, input angles, computed angles, sines of all angles, cosines of all angles.
+    The order is: inputs that are not angles, input angles, computed angles, sines of all angles, cosines of
+    all angles.
     """
 
     def __init__(self, function: Function) -> None:

@@ -26,7 +26,7 @@ from urdfkin.system.processes import python_command
 #: Text in the first lines of every exported file.
 EXPORT_MARK = "straight-line code for this robot and frame"
 _DIGEST_PLACEHOLDER = "0" * 64
-#: In this line, `insert_seal` replaces the zeros by the digest.
+#: Line of the header. `insert_seal` replaces the zeros by the digest.
 SEAL = f"Seal sha256 {_DIGEST_PLACEHOLDER}"
 _SEAL_LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 _MAIN_MACRO = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
@@ -72,8 +72,8 @@ class FileCheck:
     """Result of a check.
 
     Attributes:
-        lines: One line for each function and precision; a line begins with "good" or "WRONG".
-        passed: Whether each line begins with "good".
+        lines: One line for each function and precision. Each line begins with "good" or "WRONG".
+        passed: True if each line begins with "good".
         warnings: Reasons why the file is not verified.
     """
 

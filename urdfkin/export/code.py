@@ -30,12 +30,14 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame.
 
-    The names of the robot, the frame, the coordinates and the joints are escaped: no name can end a comment.
+    The names of the robot, the frame, the coordinates and the joints are escaped, so no name can end a
+    comment.
 
     Attributes:
-        identifiers: Names in the code, by letter: "q": coordinates; "v", "a": velocities; "s": joints.
-        maybe_proof: None for code that is not exported.
-        exact: Returns code with exact constants.
+        identifiers: Lists of names in the code. The keys are "q" (coordinates), "v" and "a" (velocities), and
+            "s" (joints).
+        maybe_proof: The proof, or None for code that is not exported.
+        exact: Function that returns the code with exact constants.
     """
 
     name: str

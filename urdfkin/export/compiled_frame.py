@@ -4,8 +4,8 @@ The first call of a quantity compiles exported C code with the system's compiler
 with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key consists of the C code, the compiler, its options and
-the processor. On Linux, the code is loaded from memory, because another program could change a file after the
-test of the checksum. Other systems load the code from a temporary file.
+the processor. Linux loads the code from memory. Another program could change a file between the test of its
+checksum and the loading. Other systems load the code from a temporary file.
 """
 
 from __future__ import annotations
@@ -204,9 +204,9 @@ class CompiledFrame:
     """Compiled functions for one robot frame: the result of `Robot.compile`.
 
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
-    exactly the same result in a batch and in a single call. A wrong shape or a number that is not finite is
-    an error. The machine code is compared with Pinocchio once, on more than a hundred configurations. After
-    `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of
+    exactly the same result in a batch and in a single call. A wrong shape and a number that is not finite
+    raise InputError. The machine code is compared with Pinocchio once, on more than a hundred configurations.
+    After `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of
     a `CompiledFrame` as unchecked.
 
     Attributes:

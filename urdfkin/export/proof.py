@@ -259,6 +259,6 @@ def _round_up(x: float) -> str:
 
 def _round(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
-        return "0.0"  # A bound of 0 accepts only equal numbers.
+        return "0.0"  # With a bound of 0, the self-test accepts only equal numbers.
     with localcontext(prec=digits, rounding=rounding):
         return f"{float(+Decimal(x)):.{digits}g}"

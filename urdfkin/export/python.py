@@ -54,7 +54,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that fills an array."""
+    """Return a `result` function, which makes code that fills an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -67,7 +67,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that returns a matrix.
+    """Return a `result` function, which makes code that returns a matrix.
 
     A Hessian becomes a matrix (6 nv, nv).
     """
@@ -133,9 +133,9 @@ def _array_first_lines(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that stacks numbers.
+    """Return a `result` function, which makes code that stacks numbers.
 
-    Arrays may be immutable, for example in JAX.
+    The code does not fill an array, because some libraries have immutable arrays, for example JAX.
     """
 
     def result(writer: Writer) -> Iterator[str]:

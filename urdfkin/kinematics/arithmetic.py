@@ -35,7 +35,7 @@ def rebind_functions(
 ) -> dict[str, Any]:
     """Return copies of all functions of the modules, by name.
 
-    The copies call other copies and the replacements.
+    Each copy calls copied functions and replacements instead of the original functions.
 
     Args:
         modules: Modules in import order. For example, `outputs` imports from `recursion` and therefore

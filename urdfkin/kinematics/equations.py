@@ -188,7 +188,7 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 # -- planar and floating joints -----------------------------------------------------------------------
 # The joint's velocity is expressed in the axes of the link after the joint.
-# The vector b contains the time derivatives of the components of this velocity.
+# The vector b contains the time derivatives of the joint velocity's components.
 # The axes of the link after the joint rotate with the angular velocity w + o.
 
 

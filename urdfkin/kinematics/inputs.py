@@ -21,8 +21,8 @@ UNIT_TOLERANCE = 1e-12
 #: The absolute values of the entries in a row of R sum to at most sqrt(3).
 #: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: Letters of NumPy's `dtype.kind` for data that are not real numbers:
-#: c complex, S bytes, U text, m timedelta, M datetime, V void.
+#: Values of NumPy's `dtype.kind` for data that are not real numbers.
+#: The letters mean complex (c), bytes (S), text (U), timedelta (m), datetime (M) and void (V).
 #: For example, NumPy converts dates and the text "1.5" to floats without reporting an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)

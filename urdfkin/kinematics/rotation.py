@@ -31,14 +31,14 @@ M = U H.
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
 quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
 velocity in the fixed frame 0, as in the textbook. With `frame="body"`, functions express the angular velocity
-in the body's own frame. Quaternion rates have no singularity. `integrate_orientation` integrates quaternion
-rates, because the integral of the angular velocity is not an orientation (example 7.3).
+in the body's own frame. Quaternion rates have no singularity. The integral of an angular velocity is not an
+orientation (example 7.3). Therefore, `integrate_orientation` integrates quaternion rates.
 
 Euler angles have 24 sequences. The three letters of a sequence are the axes of the three angles. Capital
 letters are axes that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes:
-"xyz" is the URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. A distance of
-`nearest` or less from the singularity raises RepresentationSingularityError. The functions for Euler angles
-express angular velocities in the fixed frame 0.
+"xyz" is the URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. Functions with the
+argument `nearest` raise RepresentationSingularityError within this distance of the singularity. The functions
+for Euler angles express angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
         ws: (..., n, 3) angular velocities of frame i + 1 relative to frame i, in frame i.
 
     Returns:
-        Angular velocity of frame n in frame 0.
+        (..., 3) angular velocity of frame n relative to frame 0, in frame 0.
     """
     Rs, ws = as_rotations(Rs, "Rs"), as_vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -605,15 +605,14 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the condition number of Omega.
+    """Return the condition number of Omega, cot(d / 2).
 
-    The second axis is perpendicular to the first and third axis.
-    Let d <= pi/2 be the angle between the lines of the first and third axis.
+    The angle d is the angle between the lines of the first and the third rotation axis, from 0 to pi/2. The
+    second axis is perpendicular to both. Therefore, Omega has these singular values:
 
-        singular values of Omega:  1, sqrt(1 + cos d), sqrt(1 - cos d)
-        condition number:          cot(d/2)
+        `1, sqrt(1 + cos d), sqrt(1 - cos d)`
 
-    The singularity itself, d = 0, raises RepresentationSingularityError.
+    At the singularity, d is 0, and the function raises RepresentationSingularityError.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

@@ -249,7 +249,7 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: Value of `eps * scale` for the smallest nonzero scale (`SMALLEST_NORMAL`).
+#: `eps * scale` for the smallest nonzero scale, which is `SMALLEST_NORMAL`.
 SMALLEST_SUBNORMAL = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
@@ -307,10 +307,9 @@ AXIS_ROUNDINGS = 5.0
 #: Yaw does not change this angle.
 #: Therefore, the error is twice 22.5 eps.
 FILE_ANGLE_ROUNDINGS = 45.0
-#: Rounding error of a length along a joint axis.
-#: The unit of the error is eps times the length of the path.
+#: Rounding error of a length along a joint axis, as a multiple of eps times the path length.
 #: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
-#: Few sums of lengths are nearly as large as the length of the path.
+#: Few sums of lengths are nearly as large as the path length.
 LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.

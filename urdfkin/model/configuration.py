@@ -128,9 +128,9 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint, reduced by the limits of the joints that mimic it.
+    """Return the range of each joint, reduced by the limits of its mimic joints.
 
-    If these limits allow at most one value, the range is not reduced.
+    If the mimic joints allow at most one value, the range is not reduced.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -495,8 +495,7 @@ def _degrees_hint(joint: Joint, value: float) -> str:
 
 
 #: Maximum number of configurations in which urdfkin looks for angles in degrees.
-#: A user gives all configurations of a batch in the same unit.
-#: Therefore, a few configurations are enough.
+#: A batch normally has one unit, so a few configurations are enough.
 _MAX_CHECKED = 16
 
 

@@ -48,7 +48,7 @@ class CoordinateLayout:
 
     Attributes:
         symbol: "q", "v" or "a".
-        units: "rad", "m", "" without unit, or None if unknown.
+        units: "rad", "m", "" for a number without a unit, or None for an unknown unit.
         spans: First index and number of coordinates of each joint that has several coordinates.
         hints_by_name: For errors about a joint without a coordinate: hints by the joint's name.
         hints_by_length: Hints for wrong lengths.

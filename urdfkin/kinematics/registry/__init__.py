@@ -62,7 +62,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One or more sections of the chapter."""
+    """The equations of one or more sections of the chapter."""
 
     number: str
     title: str
@@ -74,7 +74,7 @@ class Misprint:
     """A wrong or incomplete statement in the chapter.
 
     Attributes:
-        test: "file::name" of a test; `printed` fails in this test, and `correct` holds.
+        test: A test, as "file::name". The test shows that `printed` is wrong and `correct` holds.
     """
 
     where: str
@@ -195,7 +195,7 @@ def explain(number: str) -> str | None:
         return (
             f"Equation {match[1]}\n\nThe chapter's page 2, with equations {', '.join(LOST_PAGE_EQUATIONS)},"
             " is lost."
-            "\nAll remaining equations up to 7.130 are available."
+            "\nAll other equations up to 7.130 are available."
         )
     return _explanation(equations()[match[1]])
 

@@ -65,8 +65,8 @@ class JointRule:
 
     Attributes:
         zero: The other program's value for the joint value 0.
-        unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn.
-            None selects the convention's unit; `factor` is then None.
+        unit: Name of the unit ("rad", "deg", "turn", "m" or "mm"), or the number of units in one turn.
+            None means the convention's unit, and `factor` is None.
     """
 
     name: str | None = None

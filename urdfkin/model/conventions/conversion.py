@@ -1,9 +1,14 @@
 """Convert q, v, a, Jacobians and six-vectors of a robot between urdfkin and another program.
 
-Let M be the matrix `Conversion.matrix`, and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v,
-and J_tool = S J M^-1. S exchanges the linear and the angular rows if the target program has the angular rows
-first. If the target program and urdfkin use different axes for the velocity of a floating or planar joint, M
-depends on q. In all other cases, M is constant.
+The target program has these joint velocities, joint accelerations and Jacobians:
+
+    `v_tool = M v`
+    `a_tool = M a + M' v`
+    `J_tool = S J M^-1`
+
+M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
+rows if the target program has the angular rows first. M depends on q only if the target program and urdfkin
+use different axes for the velocity of a floating or planar joint.
 """
 
 from __future__ import annotations
@@ -75,7 +80,8 @@ class Conversion:
         tree: The robot.
         urdf: The robot's URDF text.
         convention: The convention.
-        joints: Order of the joints, instead of the convention's; required if the convention has none.
+        joints: Order of the joints, which replaces the convention's order. `joints` is required if the
+            convention has no order.
 
     Raises:
         InputError: The order is wrong, two joints get the same name, or a rule does not fit its joint.
@@ -795,12 +801,9 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Find the index, factor and zero that convert "q" or "v" between two conventions.
+    """Return the reordering that converts "q" or "v" from one convention to another, or None.
 
     A `Reordering` cannot convert angles to cosines, or change a velocity's frame.
-
-    Returns:
-        None if no reordering exists.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
