@@ -45,7 +45,7 @@ from urdfkin.model.tree import (
 #: Tolerance of handwritten screws and of M.
 #: The length of an axis vector may differ from 1 by this number.
 #: The pitch (m/rad) of a screw may differ from 0 by this number.
-#: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
+#: For the rotation matrix R in M, the entries of R R^T may differ from the identity by this number.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -196,8 +196,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        The frame of the link NAME_link has its origin on the axis of the joint NAME.
-        In the zero configuration, this frame is parallel to the base frame.
+        For example, link `joint_1_link` has its frame's origin on the axis of `joint_1`.
+        In the zero configuration, all link frames are parallel to the base frame.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links

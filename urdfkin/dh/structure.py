@@ -100,8 +100,9 @@ class Structure:
     Attributes:
         joints: A letter for each joint, R or P.
         freedoms: Rank of the Jacobian at a random configuration.
-        reach: Upper bound (m) within the joint limits; infinite if a prismatic joint has no limits.
-        sampled_reach: Largest sampled distance, m.
+        reach: Upper bound (m) of the distance within the joint limits. The bound is infinite if a prismatic
+            joint has no limits.
+        sampled_reach: Largest sampled distance (m).
         reach_from: Point (m) in the base frame that does not depend on q.
         reach_point: Description of `reach_from`.
     """
@@ -285,7 +286,7 @@ def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray
     """Sample tip positions without mimic rules.
 
     Returns:
-        Tip positions at all samples, and the Jacobian at the first sample.
+        The tip positions at all samples, and the Jacobian at the first sample.
     """
     ranges = [joint_value_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
@@ -433,7 +434,8 @@ def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArr
 def _choose_axis_points(screws: ProductOfExponentials) -> FloatArray:
     """Return a point of each axis; intersecting axes have the same point.
 
-    Three axes have priority over two, and later intersections over earlier ones.
+    An intersection of three axes has priority over an intersection of two axes. Among intersections of the
+    same number of axes, the last one on the path has priority.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

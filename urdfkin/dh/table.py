@@ -42,8 +42,8 @@ from urdfkin.system.lazy_import import get_hook
 class DHConvention(StrEnum):
     """Convention of a table.
 
-    standard (distal): joint i has the axis z_{i-1}
-    modified (Craig): joint i has the axis z_i
+    In a standard (distal) table, joint i has the axis z_{i-1}. In a modified table (Craig), joint i has the
+    axis z_i.
     """
 
     STANDARD = "standard"
@@ -163,7 +163,8 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: An angle looks round if |angle - nonzero multiple of 15 degrees| <= this number * 15 degrees.
+#: An angle looks round if it is near a nonzero multiple of 15 degrees.
+#: The largest difference is this number times 15 degrees.
 _ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6
@@ -260,10 +261,10 @@ class SnapChange:
     """An angle that was rounded to a multiple of 15 degrees.
 
     Attributes:
-        row: Index of the row; -1 is the base, n the tool.
-        angle: Rotation of the rest of the chain, rad.
+        row: Index of the row. The base has the index -1, and the tool has the index n.
+        angle: Angle (rad) by which the change rotates the rest of the chain.
         lever: Bound of the tip's distance (m) from the rotation's centre, with prismatic joints at zero.
-        prismatic_joints: Prismatic joints between this centre and the tip.
+        prismatic_joints: Prismatic joints between the rotation's centre and the tip.
     """
 
     row: int
@@ -392,7 +393,7 @@ class DHTable(Displayable):
         """Return the table in Markdown.
 
         Args:
-            angles: "radians" (exact multiples of pi/12 as fractions of pi) or "degrees".
+            angles: "radians" or "degrees". In radians, exact multiples of pi/12 become fractions of pi.
             lengths: "metres" or "millimetres".
             digits: Significant digits.
 
@@ -457,8 +458,7 @@ class DHTable(Displayable):
     def joint_names(self) -> tuple[str, ...]:
         """Names of the coordinates, in row order.
 
-            row of an independent joint   the joint's own name
-            row of a mimic joint          the name of the mimicked joint, listed only once
+        The row of a mimic joint has the name of the mimicked joint. Each name is listed once.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").joint_names
@@ -577,9 +577,7 @@ class DHTable(Displayable):
         return Path(tuple(steps))
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
-        """Return the (..., 4, 4) pose T_base_tip.
-
-        The pose is the product of base, rows and tool.
+        """Return the (..., 4, 4) pose T_base_tip, the product of base, rows and tool.
 
         Args:
             q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or

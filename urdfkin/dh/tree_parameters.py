@@ -1,9 +1,9 @@
 """Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame, whose axis z_j is along the axis of the link's own joint. The antecedent of link j is
-the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this pose in
-frame i:
+link j has one frame. The axis z_j of the frame is the axis of joint j, which moves link j. The antecedent of
+link j is the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this
+pose in frame i:
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
@@ -175,7 +175,7 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
             raise InputError(
                 f"a {joint.kind.value} joint has several axes, but a row of the table has one axis",
                 where=f"joint {joint.name}",
-                remedy="load the robot without root_joint, or derive tables of paths without this joint",
+                remedy="load the robot without root_joint, or make a table of a path without this joint",
             )
     lengths = _path_lengths(tree)
     links = _find_link_axes(tree, lengths)
@@ -211,7 +211,7 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return each link's axis frame; for a fixed joint, the link's URDF frame."""
+    """Return the axis frame of each link. If the link's joint is fixed, this is the link's URDF frame."""
     links = list[_LinkAxis]()
     # Each link has an entry: an index i, the pose T_i_link, and the number of fixed joints from link i to the
     # link. For a moving link, i is the link's own index. For all other links, i is the antecedent's index.
@@ -249,7 +249,7 @@ def _find_transforms(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
-    # For a link without a moving child, x is chosen so that theta is 0.
+    # If no moving link follows a link, the direction of x is free. This choice of x makes theta 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)

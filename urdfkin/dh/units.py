@@ -202,7 +202,7 @@ class InvalidCellError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The content of a cell, for example -q2 + 90 deg.
+    """The parsed text of a cell, for example of "-q2 + 90 deg".
 
     Attributes:
         number: The constant, in `unit`.

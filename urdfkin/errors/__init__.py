@@ -241,14 +241,14 @@ class SourceError(UrdfkinError, OSError):
 
 
 class RepresentationSingularityError(InputError):
-    """Euler angles are at their representational singularity (7.56), or too near to it.
+    """Euler angles are too near to their representational singularity (7.56).
 
     At the singularity, some angular velocities correspond to no derivatives of the angles.
 
     Attributes:
         sequence: The sequence of the Euler angles, as in the message.
         distance: Distance (rad) of the middle angle from its value at the singularity.
-        sample: Index of the worst sample of a batch; () for a single sample.
+        sample: Index of the worst sample of a batch, or () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:

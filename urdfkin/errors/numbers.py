@@ -77,7 +77,7 @@ _MAX_QUANTITY_LENGTH = 200
 
 
 class ParsedNumber(NamedTuple):
-    """A parsed number; a number with a unit is converted to radians or metres.
+    """A parsed number. If the text has a unit, the number is converted to radians or metres.
 
     Attributes:
         unit: "rad", "m", or None for a number without a unit. A multiple of pi without a unit is in radians.

@@ -1,7 +1,7 @@
 """Symbolic numbers: arithmetic with these numbers creates a graph of expressions for exported code.
 
-The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each new expression:
+The equations of `urdfkin.kinematics.equations` accept symbolic numbers instead of floats. The graph
+simplifies each new expression:
 
 | Expression | Simplified expression |
 |---|---|

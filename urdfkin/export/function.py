@@ -48,7 +48,7 @@ from urdfkin.verify.quantities import Quantity
 INPUT_LETTERS = ("q", "v", "a")
 #: Operations whose result is always assigned to a variable.
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
-#: Maximum number of operations in a statement.
+#: Maximum number of operations in a statement of exported code.
 _MAX_STATEMENT_OPERATIONS = 12
 #: Maximum number of results whose derivatives are computed together, to limit memory.
 _RESULTS_PER_PASS = 512
@@ -224,8 +224,8 @@ def _name_nodes(step: int, state: LinkState) -> None:
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Bound the errors (n, results) in single precision.
 
-    The unit is eps = 2^-23. The inputs must be single-precision numbers. Errors of the constants in double
-    precision are excluded. Beyond the range of single precision, the bound is inf.
+    The unit is eps = 2^-23. The inputs must be single-precision numbers. The bound does not include the
+    errors of the double-precision constants. The bound is inf if single precision overflows.
     """
     value = function.node_values(inputs)
     bounds = np.zeros((len(inputs[0]), len(function.results)))

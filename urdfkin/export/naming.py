@@ -1,7 +1,7 @@
 """Convert names in a URDF to identifiers and comments for exported code in every language.
 
 Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
-identifier is a keyword.
+identifier is a keyword of a programming language.
 """
 
 from __future__ import annotations

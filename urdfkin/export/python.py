@@ -27,7 +27,7 @@ class Dialect:
 
     Attributes:
         result: Generator of the code lines that return the results.
-        imports: Import lines. `{}` is replaced by the needed functions, such as `cos, sin`.
+        imports: Import lines. The names of the used functions replace `{}`, for example `cos, sin`.
         values_body: Body of the exported function `_values`.
             `_values` evaluates a function at several configurations.
         input_format: Pattern of an input's number, such as `q[0]`.
@@ -188,10 +188,9 @@ def _make_input_check(
 ) -> str:
     """Return code of the function `_demand`.
 
-    `wrong_type` and `is_array` are Python expressions. `wrong_type` is true for numbers of a wrong type.
-    `is_array` tests whether the input `x` is an array. If `is_array` is empty, `_demand` does not test
-    whether `x` is an array.
-    `parameters` contains further parameters of `_demand`.
+    `wrong_type` and `is_array` are Python expressions about the input `x`. `wrong_type` is true if the
+    numbers in `x` have a wrong type. `is_array` is true if `x` is an array. If `is_array` is empty, `_demand`
+    does not test whether `x` is an array. `parameters` contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _INPUT_CHECK.format(
@@ -336,7 +335,7 @@ DIALECTS = {
     "jax": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision.\n"
         "Batch axes broadcast. The functions support jit, vmap and grad.\n"
-        "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
+        "For long chains, XLA's fusion pass takes minutes. The following code disables the fusion pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         helpers=_make_input_check("not jnp.issubdtype(x.dtype, jnp.floating)")

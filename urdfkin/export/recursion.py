@@ -9,8 +9,8 @@ motion about or along z.
 | velocity, acceleration for WORLD | world |
 | other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
 
-For LOCAL_WORLD_ALIGNED, all rotations along the path are then applied to velocity and acceleration one after
-another. These rotations need a third fewer operations than the computation of the rotation matrix R.
+For LOCAL_WORLD_ALIGNED, the velocity and the acceleration are then rotated joint by joint to the world axes.
+This needs a third fewer operations than the computation of the frame's rotation matrix.
 """
 
 from __future__ import annotations

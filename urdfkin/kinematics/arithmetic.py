@@ -19,9 +19,9 @@ VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transp
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return copies of the functions in `equations` that call the functions `vectors` instead of their own.
+    """Return copies of the functions in `equations` that call replacements such as `plus` and `cross`.
 
-    The keys of `vectors` are names of functions in `equations`. `decorate` is applied to each copy.
+    `vectors` contains the replacements by name. `decorate` is applied to each copy.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)

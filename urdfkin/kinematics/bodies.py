@@ -16,11 +16,12 @@ The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook
 Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape;
 six-vectors are [linear; angular]; units are metres, radians and seconds.
 
-There are two Jacobians; the textbook warns that the two are often confused. The velocity Jacobian J_v (...,
-6, n) converts joint velocities to the linear and the angular velocity of the end frame. The manipulator
-Jacobian J converts joint velocities to x-dot, where x = (position, orientation). Another name for J is
-analytical Jacobian. For three Euler angles in any sequence (the textbook uses "ZYZ"), x has 6 numbers and J
-is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J is (..., 7, n).
+There are two Jacobians, which are often confused. The velocity Jacobian J_v (..., 6, n) converts joint
+velocities to the linear and the angular velocity of the end frame. The vector x contains the position and the
+orientation of the end frame. The manipulator Jacobian J converts joint velocities to the time derivative of
+x. Another name for J is analytical Jacobian. For three Euler angles in any sequence (the textbook uses
+"ZYZ"), x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7
+numbers and J is (..., 7, n).
 
 | Argument | InputError for |
 |---|---|

@@ -357,7 +357,10 @@ def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return the velocity phi-dot k x p (7.21)."""
+    """Return the velocity of the point p, which rotates about the axis k (7.21).
+
+        `phi-dot k x p`
+    """
     return np.cross(angular_velocity_about(axis, rate), as_vectors(p, "p"))
 
 

@@ -262,9 +262,9 @@ MIN_DIVISOR = 1e-300
 PINOCCHIO_ROUNDINGS = 24.0
 #: This is the allowed difference between urdfkin and MuJoCo:
 #:     `joints * factors * MUJOCO_ROUNDINGS * eps * scale`
-#: `joints` is the same number as for Pinocchio.
-#: `factors` is twice the number of factors for Pinocchio.
-#: A term has more factors because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
+#: `joints` is the number of joints that `PINOCCHIO_ROUNDINGS` defines.
+#: `factors` is twice the number of factors that `PINOCCHIO_ROUNDINGS` defines.
+#: MuJoCo's terms have more factors, because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_MIMIC_ROUNDINGS = 8.0
@@ -323,8 +323,7 @@ ANGLE_ROUNDINGS = 4.0
 #:     entry = a x - b y:               0.75
 #:     x = c d - e f,  y = g h - k l:   0.75
 ENTRY_ROUNDINGS = 2.0
-#: A length is rounded to twelve digits if the length changes by at most this number.
-#: The unit of the change is eps times the length of the path.
+#: A length is rounded to twelve digits if the change is at most this number times eps times the path length.
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
@@ -334,9 +333,9 @@ SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: The first matrix multiplication has an error of 1.4, and the second of 1.8.
 ROTATION_ROUNDINGS = 8.0
 
-#: Allowed error (in eps) of a mimicked joint's computed limit.
-#: urdfkin computes this limit from a mimic joint's limit.
-#: The computed limit is (limit of the mimic joint - offset) / multiplier: a subtraction and a division.
+#: Allowed error (in eps) of a mimicked joint's limit that urdfkin computes from a mimic joint's limit.
+#: The computation of the limit has a subtraction and a division:
+#:     `(limit of the mimic joint - offset) / multiplier`
 #: The mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5, so the sum is 2.0.
 #: urdfkin moves each end of the mimicked joint's range inwards by 4.0, twice the sum.
@@ -345,7 +344,7 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference between urdfkin and Pinocchio for `factors` = 1, in eps.
+    """Return the allowed difference (eps) between urdfkin and Pinocchio for a term with one factor.
 
         `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 

@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Minimum size (m) of a robot in a comparison.
-#: If all frames have the same origin, the computed size of the robot is 0.
+#: Minimum size (m) of a robot in a comparison of mechanisms.
+#: The computed size is 0 if all frames have the same origin.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -147,7 +147,7 @@ class FrameChain(Displayable):
 
     @property
     def constants(self) -> tuple[FloatArray, ...]:
-        """The n + 1 constant poses A_0 ... A_n.
+        """The n + 1 constant poses, from A_0 to A_n.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -187,7 +187,7 @@ class FrameChain(Displayable):
         Each joint frame is the frame before the joint's motion.
 
         Args:
-            q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
+            q: (..., coordinates) in the order of `joint_names`, or None for the zero configuration.
 
         Returns:
             (..., n + 1, 4, 4) poses in the base frame.

@@ -53,7 +53,6 @@ from urdfkin.model.tree import (
 #: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
 #: These are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.
-#: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
 #: Text of the condition under which an upper bound holds.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
@@ -339,9 +338,8 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value of each locked joint, rad or m.
 
-    A locked joint without a value is at the named pose's value.
-    Without a named pose, the joint is at 0.
-    Only `joints` stay movable; by default, all joints not in `lock`.
+    If `lock` names a joint without a value, the joint is locked at the value of the named pose. The value is
+    0 if `lock` names no pose. If `joints` is given, all other joints are locked.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")

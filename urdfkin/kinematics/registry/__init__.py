@@ -156,8 +156,8 @@ October 2000. Well-known equations are:
 * the forward recursion (7.127 to 7.130).
 
 Tests check this table. Each equation except the {len(lost)} equations on the lost page has a row. Each
-function and each test in the table exists. If a function computes an equation slightly wrong, at least one
-test of the equation fails. If a row states no other frame, vectors are expressed in frame 0."""
+function and each test in the table exists. A small error in a function makes at least one test of the
+equation fail. If a row states no other frame, vectors are expressed in frame 0."""
 
 
 def _row(equation: Equation) -> str:

@@ -195,7 +195,7 @@ class Conversion:
     ) -> list[int]:
         """Sort siblings by `keys`.
 
-        If `merge_fixed` is true, links that a fixed joint connects count as one link.
+        If `merge_fixed` is true, two links with a fixed joint between them count as one link.
         """
 
         def below(link: int) -> list[int]:
@@ -296,7 +296,7 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) in the link's frame, m; 0 without an inertial origin."""
+        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none."""
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -351,7 +351,7 @@ class Conversion:
     def permutation(self) -> NDArray[np.intp] | None:
         """Indices with which `q[..., permutation]` is the target program's q.
 
-        None if the conversion also changes values.
+        The property is None if the conversion also changes values.
         """
         return self._q_index.copy() if self._plain_q else None
 
@@ -368,7 +368,7 @@ class Conversion:
     def velocity_permutation(self) -> NDArray[np.intp] | None:
         """Indices with which `v[..., velocity_permutation]` is the target program's v.
 
-        None if the conversion also changes values.
+        The property is None if the conversion also changes values.
         """
         return self._v_index.copy() if self._plain_v else None
 
@@ -557,7 +557,7 @@ class Conversion:
             (..., program's nv, nv) matrix.
 
         Raises:
-            InputError: M depends on q, and q is None.
+            InputError: q is None, but M depends on q.
         """
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
@@ -596,7 +596,7 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 with v = M^-1 v_tool.
 
-        In M^-1, the column of a mimic joint is 0 if v_tool contains the mimicked joint.
+        If v_tool contains a mimic joint and its mimicked joint, the mimic joint's column in M^-1 is 0.
 
         Returns:
             (..., nv, program's nv) matrix.
@@ -695,7 +695,10 @@ class Conversion:
     def jacobian_rate(
         self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
     ) -> FloatArray:
-        """Convert the time derivative J' of a Jacobian J to S (J' M^-1 + J (M^-1)')."""
+        """Convert the time derivative J' of urdfkin's Jacobian J to the target program.
+
+            `S (J' M^-1 + J (M^-1)')`
+        """
         converted = self.jacobian(q, rate)
         if self.is_constant:
             return converted
@@ -855,7 +858,7 @@ def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     """Return the indices that reorder the target program's q or v as urdfkin's q or v.
 
-    The index of a mimic joint is used only if the mimicked joint has no coordinate in the target program.
+    If the target program has no coordinate for a mimicked joint, its mimic joint's index is used.
     """
     return [
         min(
