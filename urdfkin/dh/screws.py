@@ -1,11 +1,11 @@
-"""Compute a path's product of exponentials, in Lynch and Park's form: a zero pose and a screw per joint.
+"""Compute a path's product of exponentials, in the form of Lynch and Park.
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in the
-book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w. For a
-prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame; body screws B =
-Ad(M^-1) S are in the tip frame.
+M is the tip's pose in the zero configuration. Each joint has a screw (w, v), with the **angular part first**,
+as in the book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w.
+For a prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame. Body screws
+B = Ad(M^-1) S are in the tip frame.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Snap angles to multiples of 15 degrees, and compute the effect on the tip.
 
 To snap an angle means to replace the angle by the nearest multiple of 15 degrees. An angle is snapped only if
-it differs from this multiple by at most a tolerance. Three kinds of angles are snapped:
+the change is at most the tolerance. Three kinds of angles are snapped:
 
 1. roll, pitch and yaw of each joint's origin in the URDF;
 2. the tilt between consecutive axes, and the rotations about these axes;

@@ -128,12 +128,11 @@ class DHRow:
 
     @property
     def distance_to_normal(self) -> float:
-        """Distance (m) of two points on the next axis; 0 except in a Hayati row.
+        """Distance (m), along the next axis, between the row's x axis and the end of the common normal.
 
-            first point    intersection with the Hayati row's x axis
-            second point   end of the common normal
+        The distance is 0 except in a Hayati row. With the angle `tilt` between the two joint axes, it is:
 
-            distance = |a sin(beta)| / sin^2(tilt)
+            `|a sin(beta)| / sin^2(tilt)`
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].distance_to_normal
@@ -258,7 +257,7 @@ def nearest_twelfth(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """An angle that was rounded to a multiple of 15 degrees.
+    """The change of one angle to a multiple of 15 degrees.
 
     Attributes:
         row: Index of the row. The base has the index -1, and the tool has the index n.
@@ -504,13 +503,11 @@ class DHTable(Displayable):
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 
-        The bound divided by `span` bounds the orientation error in radians.
+            `eps * (8 (n + 1) + sum of |angles|) * length`
 
-            bound = eps * (8 (n + 1) + sum of |angles|) * length
-            angles: values of the revolute joints
-            length: `span` + sum of |values of the prismatic joints| + length of the base's translation
-
-        `urdfkin.kinematics.roundings` derives the factor 8.
+        The angles are the values of the revolute joints. The length is the sum of `span`, the absolute values
+        of the prismatic joints, and the length of the base's translation. The bound divided by `span` bounds
+        the orientation error in radians. `urdfkin.kinematics.roundings` derives the factor 8.
 
         >>> import urdfkin
         >>> bool(urdfkin.load("planar_two_link").dh("tip", "base").rounding([0.0, 0.0]) < 1e-13)

@@ -100,9 +100,9 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error, in eps * reach.
+        """Estimated rounding error of a pose, as a multiple of eps * reach.
 
-        The estimate is not a proven bound, and excludes Pinocchio's rounding errors.
+        The estimate is not a proven bound, and does not include Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS

@@ -40,8 +40,8 @@ def code_for_language(code: FrameCode, to: str) -> FrameCode:
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """Return an exported file's text with its digest.
 
-    `file`, for example `arm.c`, replaces the default file name in the text. The default name remains if
-    `file` contains other characters than ASCII letters, digits, "_", "." and "-".
+    `file`, for example `arm.c`, replaces the default file name in the text. The text keeps the default name
+    if `file` contains a character that is not an ASCII letter, a digit, "_", "." or "-".
 
     Raises:
         UnknownNameError: `to` is not a key of `LANGUAGES`.

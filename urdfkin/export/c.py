@@ -29,7 +29,7 @@ _PLACEHOLDER = re.compile(r"@(\w+)@")
 def write(code: FrameCode, to: str = "c") -> str:
     """Return a C file.
 
-    If the macro `NAME_DECLARATIONS` is defined, only declarations are compiled.
+    If the macro `NAME_DECLARATIONS` is defined, the compiler reads only the declarations.
     """
     return c_file(
         code,

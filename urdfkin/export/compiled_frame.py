@@ -144,8 +144,8 @@ def _load_code(data: bytes) -> ctypes.CDLL:
         file.write(data)
         file.flush()
         # The loader identifies a library by the library's path, which contains the file descriptor.
-        # After the file is closed, a library that is loaded later can have the same file descriptor.
-        # A different number of "./" for each library makes all paths different.
+        # After this file is closed, the next library can have the same file descriptor.
+        # Therefore, each path contains a different number of "./".
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
@@ -167,8 +167,8 @@ def _processor_features() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results.
-#: The results of eight configurations then need at most half a megabyte of stack.
+#: Maximum number of results of one configuration.
+#: With this limit, eight configurations need at most half a megabyte of stack.
 _MAX_RESULTS = 8192
 # Plain integers are faster than members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
@@ -414,7 +414,7 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether the machine code can use all arguments without conversion.
 
-        For a large batch, the conversion in `Call` takes 10 % of the time.
+        In a large batch, the conversion of the arguments takes 10 % of the time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.may_overflow) and _is_plain(

@@ -229,7 +229,7 @@ def make_exact_functions(
 
 
 def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Evaluate with more than `REFERENCE_DIGITS` digits, then round to doubles (n, ...)."""
+    """Evaluate with more than `REFERENCE_DIGITS` digits, and return the results (n, ...) as doubles."""
     with precision(REFERENCE_DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
             list(map(float, evaluate_intervals(function, one)))

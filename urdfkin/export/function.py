@@ -241,7 +241,7 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives with respect to x.
+        """Add `slope` to the derivatives of the results with respect to x.
 
         If x is a constant, add |slope| * (error of x) to the bounds instead.
         """
@@ -267,7 +267,7 @@ def _bounds_of_results(
 
 
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
-    """Return the rounding errors (n,) of one operation, in eps = 2^-23."""
+    """Return the rounding errors (n,) of the node's operation with the results x, in eps = 2^-23."""
     size = np.abs(x)
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)

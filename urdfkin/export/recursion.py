@@ -49,7 +49,7 @@ class TreeRecursion(Recursion):
     """The forward recursion along one path.
 
     Attributes:
-        inputs: Numbers q, v and a; zeros if unused.
+        inputs: The numbers of q, v and a. Unused inputs contain zeros.
         own_axes: True if each link's vectors are expressed in the link's own axes.
         turns: Rotation matrices from each frame to the previous frame.
         end: State of the frame.
@@ -129,7 +129,7 @@ class TreeRecursion(Recursion):
 
 
 def _drop_tiny_entries(x: Sequence[float]) -> Vector:
-    """Replace entries below the largest entry's rounding error by 0.
+    """Replace each entry that is smaller than the largest entry's rounding error by 0.
 
     Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
     `urdfkin.kinematics.roundings` account for the omitted entries.
@@ -177,10 +177,8 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the Hessian (6, nv, nv) row by row.
 
-    The Hessian contains a matrix H_i (6, nv) for each joint motion i:
-
-        H_i: derivative of the Jacobian with respect to joint motion i
-        time derivative of the Jacobian = sum of H_i v_i (7.126)
+    For each joint motion i, the Hessian contains the derivative H_i (6, nv) of the Jacobian with respect to
+    the motion. The time derivative of the Jacobian is the sum of H_i v_i (7.126).
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)

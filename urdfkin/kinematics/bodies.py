@@ -13,8 +13,8 @@ The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook
 | `representation` | | SciPy's name of an Euler sequence, or "quaternion" |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape;
-six-vectors are [linear; angular]; units are metres, radians and seconds.
+Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape.
+Six-vectors are [linear; angular]. Units are metres, radians and seconds.
 
 There are two Jacobians, which are often confused. The velocity Jacobian J_v (..., 6, n) converts joint
 velocities to the linear and the angular velocity of the end frame. The vector x contains the position and the

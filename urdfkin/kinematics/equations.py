@@ -110,7 +110,7 @@ def point_position(d, R, p):
 
 
 def interorigin_vector(d, z, a, x):
-    """7.64: distance d along the axis z plus length a along x."""
+    """7.64: interorigin vector, the sum of d along the axis z and a along x."""
     return plus(times(d, z), times(a, x))
 
 

@@ -290,11 +290,11 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate 7.57 by the fourth-order Runge-Kutta method; return the quaternions (n, ..., 4) at n times.
+    """Return the quaternions (n, ..., 4) at n times, by the fourth-order Runge-Kutta method for 7.57.
 
     `quat` is the orientation at the first time. The `times` (s) increase. `w(t)` is the angular velocity
-    (rad/s), expressed in `frame`. A jump of `w` must be at one of the `times`, because no step evaluates `w`
-    at one of the `times`.
+    (rad/s), expressed in `frame`. Each jump of `w` must be at one of the `times`. The steps evaluate `w` only
+    between the `times`.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -357,9 +357,9 @@ def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return the velocity of the point p, which rotates about the axis k (7.21).
+    """Return the velocity of a point p that rotates about the axis k (7.21).
 
-        `phi-dot k x p`
+    The velocity is `phi-dot k x p`.
     """
     return np.cross(angular_velocity_about(axis, rate), as_vectors(p, "p"))
 
@@ -385,13 +385,13 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 def log_rotation(R: ArrayLike) -> FloatArray:
     """Return the rotation vector phi k.
 
-    The angle is in [0, pi]. For the angle pi, k may have either sign.
+    The angle is in [0, pi]. If the angle is pi, the sign of k is arbitrary.
     """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # Squares of components below 1e-150 may lose digits. If |vector| < 1e-150, the result is 2 * vector.
+    # The squares of components below 1e-150 may underflow. If |vector| < 1e-150, the result is 2 * vector.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
@@ -411,7 +411,7 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 _AXIS_LETTERS = "xyz"
 _TRIPLES = [a + b + c for a in _AXIS_LETTERS for b in _AXIS_LETTERS for c in _AXIS_LETTERS if a != b != c]
-#: Twelve Euler sequences about moving axes, twelve about fixed axes.
+#: The first twelve sequences have moving axes. The last twelve have fixed axes.
 EULER_SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
@@ -440,7 +440,7 @@ class EulerSequence:
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Reverse the order of the values if the axes are fixed."""
+        """Reverse the last axis of an array if the rotation axes are fixed."""
         return values[..., ::-1] if self.is_fixed else values
 
 
@@ -496,8 +496,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     | other | [-pi/2, pi/2] |
 
     At the singularity, only the sum or difference of the first and third angle is determined. For moving
-    axes, the first angle is arbitrary (0 for exact entries of R), and the third angle completes the rotation.
-    For fixed axes, the third angle is arbitrary, and the first angle completes the rotation.
+    axes, the first angle is arbitrary, and the third angle follows from the first angle. For fixed axes, the
+    third angle is arbitrary, and the first angle follows from the third angle. For exact entries of R, the
+    arbitrary angle is 0.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.

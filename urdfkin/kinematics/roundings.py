@@ -266,7 +266,7 @@ PINOCCHIO_ROUNDINGS = 24.0
 #: `factors` is twice the number of factors that `PINOCCHIO_ROUNDINGS` defines.
 #: MuJoCo's terms have more factors, because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
-#: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
+#: Allowed error (in eps) of a mimic rule of an MJCF file that MuJoCo evaluates.
 MJCF_MIMIC_ROUNDINGS = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW_ROUNDINGS = 8.0
@@ -301,8 +301,8 @@ CONSTANT_POSE_ROUNDINGS = 13.7
 AXIS_ROUNDINGS = 5.0
 #: Error of the angle between consecutive axes, in eps per joint.
 #: Angles in a file are rounded.
-#: An angle with fifteen digits (DBL_DIG) has an error of half a unit of its last digit:
-#: 5e-15 rad, or 22.5 eps, for angles up to pi.
+#: An angle with fifteen digits (DBL_DIG) has an error of half a unit of its last digit.
+#: For angles up to pi, this error is 5e-15 rad, or 22.5 eps.
 #: If both joint axes are z axes, roll and pitch both change the angle between the joint axes.
 #: Yaw does not change this angle.
 #: Therefore, the error is twice 22.5 eps.

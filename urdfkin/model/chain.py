@@ -44,7 +44,7 @@ class ChainJoint:
     """One moving joint on a path.
 
     Attributes:
-        backwards: Whether the path leads from child to parent.
+        backwards: True if the path leads from child to parent.
         T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. The z axis of the pose is the joint's axis,
             or the reversed axis if `backwards` is true.
         mimic: The mimic rule, or None for an independent joint.
@@ -72,7 +72,7 @@ class FrameChain(Displayable):
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame; in the base frame if `joints` is empty.
+        T_last_tip: (4, 4) pose of the tip in the last joint's frame, or in the base frame without joints.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
             upper bound on the translation in A_k. The bound does not depend on the fixed joints' rotations.
         pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.
@@ -280,7 +280,7 @@ def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint
     """Return the joints from `base` to `tip`.
 
     Returns:
-        Pairs (joint, whether the path leads from child to parent).
+        Pairs of a joint and a bool, which is True if the path leads from child to parent.
     """
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0

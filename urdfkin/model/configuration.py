@@ -47,7 +47,7 @@ from urdfkin.model.tree import (
 )
 
 #: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
-#: If the limits of a joint allow only larger values, `sample` draws larger values.
+#: If the limits of a joint exclude all of these values, `sample` draws larger values.
 #: For a revolute or prismatic joint without limits, `sample` draws from -10 to 10 (rad or m).
 #: For a continuous joint, `sample` draws from -pi to pi.
 #: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
@@ -612,7 +612,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Random positions of planar and floating joints: -2 to 2 m.
+#: `sample` draws the positions of planar and floating joints from -2 to 2 m.
 _MAX_SAMPLED_POSITION = 2.0
 
 

@@ -61,7 +61,11 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 class JointRule:
     """The conversion of a joint value to another program's value.
 
-    The other program's value is factor * (value in rad or m) + zero, where `factor` includes `sign`.
+    The other program's value is computed from the joint value x (rad or m):
+
+        `factor * x + zero`
+
+    `factor` includes `sign`.
 
     Attributes:
         zero: The other program's value for the joint value 0.
@@ -95,7 +99,7 @@ class Convention:
     `measurement`, and all attributes from `continuous` to `angle`.
 
     Attributes:
-        joints: Names of the joints in order, if `order` is "given".
+        joints: Names of the joints in order. Only the order "given" uses these names.
         rules: Rules of single joints, by the joint's name in the URDF.
     """
 

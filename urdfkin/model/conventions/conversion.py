@@ -30,7 +30,9 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Allowed deviation from a mimic rule: this number * max(1, |`_TargetNumber.factor`|), in the target's unit.
+#: Allowed deviation from a mimic rule, in the target program's unit:
+#:     `_MIMIC_TOLERANCE * max(1, |factor|)`
+#: `factor` is an attribute of `_TargetNumber`.
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -321,7 +323,7 @@ class Conversion:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether the target program's q contains cosines and sines."""
+        """True if the target program's q contains cosines and sines."""
         return any(column.cos_or_sin for column in self._columns)
 
     @property
@@ -615,7 +617,7 @@ class Conversion:
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return the joint's part of `matrix`: (..., 3, 3) if planar, (..., 6, 6) if floating.
 
-        `q` is the robot's q. With the joint's own velocity v, return the part's time derivative instead.
+        `q` is the robot's q. If the joint's velocity v is given, return the part's time derivative.
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -697,7 +699,7 @@ class Conversion:
     ) -> FloatArray:
         """Convert the time derivative J' of urdfkin's Jacobian J to the target program.
 
-            `S (J' M^-1 + J (M^-1)')`
+        The result is `S (J' M^-1 + J (M^-1)')`.
         """
         converted = self.jacobian(q, rate)
         if self.is_constant:
@@ -713,7 +715,7 @@ class Conversion:
         Args:
             q: Configuration.
             J: (..., 6, nv) Jacobian.
-            H: (..., 6, nv, nv) derivatives of J by the coordinates.
+            H: (..., 6, nv, nv) derivatives of J with respect to the joint motions.
         """
         self._refuse_mimic_columns()
         inverse, tensor, columns = (
@@ -742,8 +744,8 @@ class Conversion:
         """Convert a result to the target program's rows and columns.
 
         Args:
-            quantity: For example "velocity".
-            inputs: q, v and a in urdfkin's convention, as far as the quantity needs them.
+            quantity: Name of the quantity, for example "velocity".
+            inputs: The inputs of the quantity (q, v and a), in urdfkin's convention.
             result: The quantity in urdfkin's convention.
             jacobian: Computes the Jacobian, which only "jacobian rate" and "hessian" need.
 
