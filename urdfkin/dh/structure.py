@@ -1,8 +1,8 @@
 """Find the structure of an arm, and export the structure for closed-form inverse kinematics solvers.
 
 Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
-point (Pieper, 1968). Distances and angles of consecutive axes are the same in every configuration, so they
-are computed in the zero configuration.
+point (Pieper, 1968). The distance and the angle of two consecutive axes do not depend on the configuration.
+Therefore, they are computed in the zero configuration.
 
 An ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et al., 2014) has the standard table
 
@@ -39,7 +39,7 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Singular values below this number count as zero.
+#: Singular values below this number are treated as zero.
 #: The rounding errors of singular values are much smaller.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
@@ -59,7 +59,7 @@ class AxisPair:
 
     Attributes:
         angle: Angle between the axes, at most pi/2 rad.
-        distance: Distance between the axes, m; 0 if a joint is prismatic.
+        distance: Distance (m) between the axes, or 0 if a joint is prismatic.
     """
 
     first: str
@@ -218,7 +218,7 @@ def _find_arm_kinds(
 
 
 def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the closed-form solvers for the arm. Approximate properties of the arm count as exact."""
+    """Return the closed-form solvers for the arm, as if its approximate properties were exact."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:

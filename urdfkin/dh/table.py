@@ -262,7 +262,8 @@ class SnapChange:
     Attributes:
         row: Index of the row. The base has the index -1, and the tool has the index n.
         angle: Angle (rad) by which the change rotates the rest of the chain.
-        lever: Bound of the tip's distance (m) from the rotation's centre, with prismatic joints at zero.
+        lever: Upper bound of the distance (m) between the rotation's centre and the tip. Prismatic joints are
+            at zero.
         prismatic_joints: Prismatic joints between the rotation's centre and the tip.
     """
 

@@ -5,7 +5,7 @@ link j has one frame. The axis z_j of the frame is the axis of joint j, which mo
 link j is the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this
 pose in frame i:
 
-    T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
+    `T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r)`
 
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
 child of link i. Therefore, gamma and b of the first moving child are zero. For a chain without branches, the
@@ -54,10 +54,10 @@ class TreeRow:
     The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Row index, from 0, of the nearest moving link towards the root; -1 is the root.
-        sigma: 0 revolute, 1 prismatic, 2 fixed.
-        mimicked_joint: The mimicked joint; without a mimic rule, the joint itself.
-        multiplier: value = multiplier * mimicked value + offset
+        antecedent: Row index of the antecedent, from 0, or -1 for the root.
+        sigma: 0 for a revolute, 1 for a prismatic and 2 for a fixed joint.
+        mimicked_joint: The mimicked joint, or the joint itself without a mimic rule.
+        multiplier: Multiplier of the mimic rule.
     """
 
     joint: str
@@ -81,7 +81,7 @@ class TreeParameters:
     """The table of a whole robot.
 
     Attributes:
-        path_lengths: (joints,) path lengths from the root to the joint origins in the URDF, m.
+        path_lengths: (joints,) path lengths (m) from the root to the joint origins in the URDF.
         T_frame_link: (joints, 4, 4) poses of the URDF link frames in the rows' frames.
         zeroed_tilt: Largest sum (rad) of the zeroed tilts along a path from the root.
     """
@@ -140,12 +140,10 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the poses of all links.
-
-        `q` is in the order of `coordinates`.
+        """Return the poses of all links for a configuration in the order of `coordinates`.
 
         Returns:
-            (..., joints, 4, 4) URDF frames in the root frame.
+            (..., joints, 4, 4) poses of the URDF link frames in the root frame.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
@@ -231,10 +229,12 @@ def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis
 def _find_transforms(
     tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
-    """Rz(phi) Tz(delta) moves a link's axis frame to the row's frame.
+    """Return the transforms between consecutive axes, and the offsets of the row frames.
+
+    A row's frame has the pose Rz(phi) Tz(delta) in the link's axis frame.
 
     Returns:
-        Transforms, and (phi, delta) by link.
+        The transforms, and (phi, delta) by link.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
@@ -320,7 +320,7 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule.
+    # The constant in a mimic joint's cell is the sum of the row's constant and the mimic rule's offset.
     variable = (
         f"q({row.mimicked_joint})"
         if row.mimicked_joint == row.joint

@@ -4,7 +4,7 @@ A table object stores metres and radians. Other units are used only when a table
 
 The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. A
 term of the sum is a number, a multiple of pi, or a multiple of a joint variable. A number or a multiple of pi
-can have a unit. A cell may contain one variable, once.
+can have a unit. A cell may contain at most one term with a variable.
 """
 
 from __future__ import annotations

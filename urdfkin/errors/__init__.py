@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Number of leading characters of a name that `find_similar_names` compares.
+#: `find_similar_names` compares at most this number of characters at the start of a name.
 _COMPARED_PREFIX_LENGTH = 128
 MAX_CHARACTER_PAIRS = 1_000_000
 _MAX_SUGGESTIONS = 3
@@ -176,7 +176,7 @@ class NotFiniteError(InputError):
 
 
 class RangeError(InputError):
-    """The numbers are so large that a result exceeds the range of double precision."""
+    """A result is too large for double precision."""
 
 
 class UnknownNameError(UrdfkinError, LookupError):

@@ -51,7 +51,7 @@ class Table:
         ]
 
     def _split_tree_lines(self) -> list[list[tuple[str, str]]]:
-        """Split each heading and cell into two texts: leading characters such as `├ `, and the rest."""
+        """Split each heading and cell into its leading characters such as `├ ` and the following text."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(TREE_LINES),)]
             for row in (self.heads, *self.cells())

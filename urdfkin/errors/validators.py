@@ -1,4 +1,4 @@
-"""Validators of arguments; a validator returns the value in the proper type, or raises InputError."""
+"""Validators of arguments. A validator returns the value in the proper type, or raises InputError."""
 
 from __future__ import annotations
 

@@ -43,7 +43,8 @@ _COMPILE_COMMANDS = {
 }
 #: Compiler and options for CUDA if the computer has nvcc and a GPU.
 _GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
+#: The check searches this number of characters at the start of a file.
+#: The check searches for `EXPORT_MARK` and for the word UNVERIFIED.
 _HEADER_LENGTH = 2000
 #: Time limit of a compiler or a test program, s.
 #: The code of a robot with a thousand joints compiles in one minute.
@@ -90,7 +91,7 @@ def check(file: Path) -> FileCheck:
     """Run an exported file's test vectors.
 
     Raises:
-        InputError: urdfkin did not write the file, cannot run a file of this kind, or the file does not run.
+        InputError: `urdfkin export` did not write the file, or the file cannot be run.
     """
     text = read_text(file)
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:

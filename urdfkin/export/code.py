@@ -56,7 +56,7 @@ class FrameCode:
     @property
     def proof(self) -> Proof:
         if self.maybe_proof is None:
-            raise ValueError("code that was not verified is not exported")
+            raise ValueError("the code has no proof, so it cannot be exported")
         return self.maybe_proof
 
     @property
@@ -185,7 +185,7 @@ def _parse_quantities(names: Collection[str]) -> list[Quantity]:
 class Writer:
     """Writes expressions as code.
 
-    If `sine` is False, sines and cosines are inputs.
+    If `sine` is False, the code reads sines and cosines from its inputs and does not compute them.
     """
 
     def __init__(

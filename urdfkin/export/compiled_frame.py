@@ -57,8 +57,8 @@ class NoCompilerError(Exception):
 def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile one function, and load the library.
 
-    The library's function `task` takes an array with the fields of `KernelArgs`. `task` returns 1 if an
-    input is not finite, else 0.
+    The library contains a function `task`. Its argument is an array with the fields of `KernelArgs`. The
+    function returns 1 if an input is not finite, else 0.
 
     Raises:
         NoCompilerError: no C compiler is installed, or the compiler rejects the code.
@@ -396,8 +396,8 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # If a number is not finite, the code below checks the inputs again.
-            # The error message then names the coordinate of this number.
+            # After a NotFiniteError, the code below checks the inputs again.
+            # That error message names the coordinate that is not finite.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])

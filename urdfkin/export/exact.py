@@ -124,7 +124,8 @@ def make_exact_plan(
 def _rotation_with_z_axis(axis: Vector, z: float) -> Matrix:
     """Return a rotation matrix with third column `axis`.
 
-    See `rotation_with_z_axis`. `axis` is a unit vector. `z` is the third component of `axis`, as a float.
+    See `rotation_with_z_axis`. `axis` is a unit vector of exact numbers. `z` is the third component of `axis`
+    as a float.
     """
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1

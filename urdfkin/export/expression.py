@@ -40,9 +40,9 @@ class Node:
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
         operands: Operands of the operation, as nodes or constants. An input has one operand, its index.
-        index: Number in the order of creation; operands have smaller numbers.
-        step: Index of the recursion's step: first the joints, then the frame, then the results.
-            The step of exact constants is -1.
+        index: Number in the order of creation. Operands have smaller numbers than the operation.
+        step: Index of the recursion's step. The steps are the joints, the frame and the results, in this
+            order. Exact constants have the step -1.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
@@ -86,7 +86,7 @@ class Node:
 class Graph:
     """The expressions of one function."""
 
-    #: Products with 0 and differences x - x become this constant.
+    #: Constant that replaces products with 0 and differences x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -172,7 +172,7 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return y if x is the expression -y or the negative constant -y, else None."""
+    """Return y if x is an expression -y or a negative constant -y; otherwise, return None."""
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None

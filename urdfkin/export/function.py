@@ -243,7 +243,7 @@ def _bounds_of_results(
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
         """Add `slope` to the derivatives of the results with respect to x.
 
-        If x is a constant, add |slope| * (error of x) to the bounds instead.
+        If x is a constant, add the absolute value of `slope` times the error of x to the bounds.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
@@ -285,6 +285,6 @@ def _constant_error(x: float) -> float:
 
 
 def _add_range_error(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add the error of possible underflow; overflow gives inf."""
+    """Add the error of a possible underflow. The error is inf if `size` overflows in single precision."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

@@ -1,6 +1,6 @@
 """Copies of `urdfkin.kinematics.equations` that call other functions.
 
-For example, in `array_equations` of `urdfkin.kinematics.number_kinds`, `plus` is `np.add`.
+For example, the copies in `urdfkin.kinematics.number_kinds.array_equations` call `np.add` instead of `plus`.
 
 This module does not import NumPy.
 """

@@ -29,8 +29,8 @@ numbers and J is (..., 7, n).
 | axis | a length other than 1 |
 | rotation matrix | a matrix that is not a rotation |
 
-An unknown `representation` raises UnknownNameError. A distance of `nearest` or less from the
-singularity of Euler angles raises RepresentationSingularityError.
+An unknown `representation` raises UnknownNameError. Functions with the argument `nearest` raise
+RepresentationSingularityError within this distance of the singularity of Euler angles.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """The terms w x p, R v_1 and d-dot of a velocity (7.124), m/s."""
+    """The three terms w x p, R v_1 and d-dot of a point's velocity (7.124), in m/s."""
 
     rotation: FloatArray
     relative: FloatArray

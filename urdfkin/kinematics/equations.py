@@ -1,9 +1,9 @@
 """The equations of motion of sections 7.3 to 7.7 of the textbook, for all kinds of numbers.
 
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
-because the equations use the arithmetic of their arguments. Each equation is written only once. Kinds of
-numbers: batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors,
-LaTeX expressions.
+because the equations use the arithmetic of their arguments. Each equation is written only once. The kinds of
+numbers are batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors,
+and LaTeX expressions.
 
 For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the functions of the
 section "vectors".
@@ -21,8 +21,8 @@ section "vectors".
 | `o`, `u` | angular and linear velocity of a planar or floating joint |
 | `b` | for such a joint: time derivatives of the components of o or u |
 
-All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
-own axes. In the link's own axes, z and the offset of an `<origin>` are constant.
+All vectors of an equation are expressed in the same axes. These are the world's axes, as in the textbook, or
+the link's own axes. In the link's own axes, z and the offset of an `<origin>` are constant.
 
 The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
 and follows joint i. In a URDF, the frame of a joint lies on the joint's own axis. The `<origin>` of joint i

@@ -1,4 +1,4 @@
-"""Validation of vectors, matrices and rotations, and conversion to float64 arrays with leading batch axes."""
+"""Check vectors, matrices and rotations, and convert them to float64 arrays."""
 
 from __future__ import annotations
 

@@ -314,7 +314,7 @@ LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.
 
-#: Rounding error (in eps rad) of an angle between -pi and pi.
+#: Rounding error (in multiples of eps rad) of an angle between -pi and pi.
 #: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
 #: The rounding of a file's angle to a double has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
@@ -327,10 +327,8 @@ ENTRY_ROUNDINGS = 2.0
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
-#: The second rotation is a product of three rotations.
-#: The product's error is the sum of four errors.
-#: The sines and the cosines have an error of 0.5 each.
-#: The first matrix multiplication has an error of 1.4, and the second of 1.8.
+#: The second rotation is a product of three rotations, with an error of 4.2 eps:
+#: 0.5 for the sines, 0.5 for the cosines, 1.4 for the first multiplication, and 1.8 for the second.
 ROTATION_ROUNDINGS = 8.0
 
 #: Allowed error (in eps) of a mimicked joint's limit that urdfkin computes from a mimic joint's limit.

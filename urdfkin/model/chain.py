@@ -1,11 +1,11 @@
 """A path between two frames as a sequence of joint axes.
 
 As in section 7.5 of the textbook, the axis of joint i is z_{i-1} at O_{i-1}. A revolute joint rotates about
-this axis, and a prismatic joint translates along this axis. The vector d_{i-1,i} leads from O_{i-1} to O_i.
-The path may lead from parent to child, from child to parent, or through a common ancestor. An example is the
-path from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes
-a joint backwards, from child to parent, the joint's axis is reversed. The joint's coordinate keeps the sign
-of the URDF. The reason is that the inverse of a rotation by q about z is a rotation by q about -z.
+z_{i-1}, and a prismatic joint translates along z_{i-1}. The vector d_{i-1,i} leads from O_{i-1} to O_i. The
+path may lead from parent to child, from child to parent, or through a common ancestor. An example is the path
+from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes a
+joint backwards, from child to parent, the joint's axis is reversed. Then the joint's coordinate keeps the
+sign of the URDF, because the inverse of a rotation by q about z is a rotation by q about -z.
 """
 
 from __future__ import annotations
@@ -228,7 +228,7 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the origins of the n joints and of the tip (..., n + 1, 3) in the base frame, m.
+        """Return the origins (..., n + 1, 3) of the n joints and of the tip in the base frame (m).
 
         Without `q`, the configuration is zero.
 

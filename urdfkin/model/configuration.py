@@ -685,8 +685,9 @@ def draw_samples(
 ) -> Samples:
     """Draw random samples for a validation.
 
-    A mimic joint may exceed its limits: the equations are also valid there.
-    Quadratic terms dominate the acceleration of every eighth sample (7.129, 7.130).
+    A mimic joint may exceed its limits, because the equations are also valid there.
+    In every eighth sample, large velocities make the quadratic terms of the acceleration dominant (7.129,
+    7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_zero_and_limits:

@@ -46,7 +46,7 @@ class Equation:
         statement: The equation in plain characters.
         definitions: Names of functions in `urdfkin.kinematics.equations` that contain the formula.
         functions: Functions that compute the equation, as "module:name".
-        tests: Tests that detect a wrong computation, as "file::name".
+        tests: Tests that fail if the computation is wrong, as "file::name".
         oracle: Independent source of expected results.
     """
 

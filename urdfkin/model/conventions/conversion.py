@@ -710,7 +710,7 @@ class Conversion:
         return converted + array @ _add_frame_axis(change, array.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
-        """Convert a kinematic Hessian to the target program.
+        """Convert urdfkin's kinematic Hessian to the target program's Hessian.
 
         Args:
             q: Configuration.
@@ -784,7 +784,10 @@ class Conversion:
 
 @dataclass(frozen=True, slots=True)
 class Reordering:
-    """The conversion of a vector x to x[..., index] * factor + zero."""
+    """The conversion of q or v from one convention to another.
+
+    A vector x is converted to `x[..., index] * factor + zero`.
+    """
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
