@@ -116,7 +116,7 @@ class ProductOfExponentials(Displayable):
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis nearest to the base's origin.
+        """(n, 3) points: the point of each revolute axis that is nearest to the base's origin.
 
         A prismatic joint has the point of the previous joint.
 
@@ -149,11 +149,9 @@ class ProductOfExponentials(Displayable):
     def path(self) -> Path:
         """The product as rotations about z axes and translations along z axes.
 
-            revolute             exp([S] q) = A Rz(q) A^-1
-            prismatic            exp([S] q) = A Tz(q) A^-1
-            z axis of A          along the joint's axis
-            constant poses       A_i^-1 A_{i+1}
-            last constant pose   A_n^-1 M
+        For a revolute joint, exp([S] q) is A Rz(q) A^-1. For a prismatic joint, it is A Tz(q) A^-1. The z
+        axis of A is along the joint's axis. The constant poses are A_i^-1 A_{i+1}, and the last one is A_n^-1
+        M.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").path.poses(np.zeros(2))[:3, 3].tolist()
@@ -258,7 +256,7 @@ def make_screws(path: FrameChain) -> ProductOfExponentials:
 
 
 def _nearest_rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to M; an exact M is unchanged."""
+    """Return the rigid transform nearest to M. An exact M is returned unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -286,7 +284,7 @@ def screws_from_rows(
     URDF has no joint with a pitch, so w . v must be 0.
 
     Args:
-        screws: (n, 6) rows (w, v); also (6, n) if n is not 6.
+        screws: (n, 6) rows (w, v). The shape (6, n) is also allowed, unless n is 6.
         M: (4, 4) or (3, 4) pose of the tip in the zero configuration, with the translation in m.
         frame: Frame of the screws: "space" (base) or "body" (tip).
         joints: Joint names.

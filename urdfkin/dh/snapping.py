@@ -131,7 +131,7 @@ def sample_within_limits(table: DHTable) -> FloatArray:
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
     """Return the angles (rad) between rotations (..., 3, 3).
 
-    |R - S| = 2 sqrt2 sin(angle / 2)
+    The angle satisfies `|R - S| = 2 sqrt2 sin(angle / 2)` in the Frobenius norm.
     """
     chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
@@ -157,8 +157,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Snap roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    # In gimbal lock, only roll + yaw or roll - yaw is defined.
-    # Therefore, roll is set to 0.
+    # In gimbal lock, only roll + yaw or roll - yaw is defined, so roll is set to 0.
     if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
@@ -265,7 +264,7 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def travel_condition(table: DHTable) -> str:
-    """Return the condition on the joint values under which a bound on the tip's displacement holds, or ""."""
+    """Return the condition under which a bound on the tip's displacement holds, or "" without a condition."""
     condition = "prismatic joints are within their limits"
     if all(row.kind.turns for row in table.rows):
         return ""

@@ -75,8 +75,8 @@ class StructureKind:
     Attributes:
         radians: Largest deviation of an angle.
         metres: Largest deviation of a length.
-        at: Centre of a spherical wrist, shoulder or joint, m; None for all other properties. The centre is in
-            the base frame and the zero configuration.
+        at: Centre (m) of a spherical wrist, shoulder or joint, in the base frame and the zero configuration.
+            For other properties, the centre is None.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Structure:
     Prismatic joints without limits are sampled within `ASSUMED_LIMIT`.
 
     Attributes:
-        joints: A letter for each joint, R or P.
+        joints: A letter for each joint: R for revolute, P for prismatic.
         freedoms: Rank of the Jacobian at a random configuration.
         reach: Upper bound (m) of the distance within the joint limits. The bound is infinite if a prismatic
             joint has no limits.
@@ -264,11 +264,11 @@ def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Bound the tip's distance from `origin`.
+    """Bound the distance between `origin` and the tip.
 
-    p_0 = origin
-    p_i: point of the next revolute axis that is nearest to p_{i-1}
-    bound = |p_1 - p_0| + ... + |p_n - p_{n-1}| + |tip - p_n| + travel of the prismatic joints
+    The points p_0 to p_n lead from `origin` to the last revolute axis. Each point p_i is the point of the
+    next revolute axis that is nearest to p_{i-1}. The bound is the sum of the distances between consecutive
+    points, the distance between p_n and the tip, and the travel of the prismatic joints.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):

@@ -67,14 +67,14 @@ class DHRow:
     """One row of a table: constant parameters in metres and radians.
 
     Attributes:
-        a: Length along x; a_{i-1} in a modified table.
-        alpha: Rotation about x; alpha_{i-1} in a modified table.
+        a: Length along x. In a modified table, row i contains a_{i-1}.
+        alpha: Rotation about x. In a modified table, row i contains alpha_{i-1}.
         d: Offset along the joint's axis, with the joint at zero.
         theta: Rotation about the joint's axis, with the joint at zero.
         kind: Revolute, continuous or prismatic.
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
-        beta: Rotation about y after alpha; 0 except in a Hayati row.
+        beta: Rotation about y after the rotation about x. Only a Hayati row has a nonzero beta.
         mimic: The mimic rule, or None for an independent joint.
         limit: The joint's limits, or None.
 
@@ -173,7 +173,7 @@ def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
     """Return S = Rz(theta) Tz(d), with theta in radians and d in metres.
 
     Returns:
-        (..., 4, 4) poses; the arguments broadcast.
+        (..., 4, 4) poses. The arguments broadcast.
     """
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
@@ -202,7 +202,7 @@ def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
     """Factor a pose into Tx(a) Rx(alpha).
 
     Returns:
-        None if the pose has another form.
+        (a, alpha), or None if the pose has another form.
 
     >>> as_a_and_alpha(link_transform(0.5, math.pi))
     (0.5, 3.141592653589793)
@@ -242,7 +242,7 @@ def clean_angle(angle: float) -> float:
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is nearly a nonzero multiple of `twelfth`.
+    """Return whether an angle is nearly a nonzero multiple of `twelfth`.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -317,9 +317,9 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a guaranteed bound (...,) of the tip's displacement by the snapped angles (m).
+        """Return a guaranteed bound (...,) of the tip's displacement (m) due to the snapped angles.
 
-        `values` are the prismatic joints' values by name.
+        `values` contains the values of the prismatic joints by name.
         """
         at_zero = sum(change.tip_displacement for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
@@ -328,7 +328,9 @@ class SnapReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Displayable):
-    """A Denavit-Hartenberg table of a path; `urdfkin.load(table)` returns a robot.
+    """A Denavit-Hartenberg table of a path.
+
+    `urdfkin.load(table)` returns a robot.
 
     Attributes:
         convention: Standard or modified.
@@ -410,7 +412,7 @@ class DHTable(Displayable):
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in LaTeX (amsmath, booktabs, graphicx).
 
-        The arguments are those of `to_markdown`.
+        The arguments are the same as for `to_markdown`.
 
         >>> import urdfkin
         >>> "tabular" in urdfkin.load("planar_two_link").dh("tip", "base").to_latex()
@@ -421,7 +423,7 @@ class DHTable(Displayable):
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in HTML.
 
-        The arguments are those of `to_markdown`.
+        The arguments are the same as for `to_markdown`.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -470,7 +472,7 @@ class DHTable(Displayable):
 
     @property
     def has_hayati_rows(self) -> bool:
-        """Whether any row has a fifth parameter, beta.
+        """True if any row has a fifth parameter, beta.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").has_hayati_rows
@@ -526,7 +528,7 @@ class DHTable(Displayable):
         The bounds cover rounding errors and the effect of snapped angles.
 
         Returns:
-            (...,) bounds in metres, and in radians.
+            Two bounds (...,), the first in metres and the second in radians.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -549,7 +551,7 @@ class DHTable(Displayable):
 
         Args:
             q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or
-                text). None: the zero configuration.
+                text). None means the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.

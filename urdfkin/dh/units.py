@@ -111,17 +111,13 @@ def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an angle as a fraction of pi.
-
-    Returns:
-        None if the angle is not exactly a multiple of pi/12.
-    """
+    """Return an angle as a fraction of pi, or None if it is not exactly a multiple of pi/12."""
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 
 
 def format_pi_fraction(fraction: Fraction, pi: str = "pi") -> str:
-    """Format a multiple of pi: 0, pi, -pi/2, 5pi/12."""
+    """Format a multiple of pi, for example as pi, -pi/2 or 5pi/12."""
     if fraction == 0:
         return "0"
     count = {1: "", -1: "-"}.get(fraction.numerator, str(fraction.numerator))

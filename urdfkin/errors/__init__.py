@@ -52,7 +52,7 @@ def find_similar_names(
 
 
 class QuestionsSection(Enum):
-    """A section of docs/questions.md; `str` returns the command that prints the section.
+    """A section of docs/questions.md. `str` returns the command that prints the section.
 
     >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
@@ -159,7 +159,7 @@ def _unpickle_error(cls: type[_E], state: dict[str, Any]) -> _E:
 
 
 class InputError(UrdfkinError, ValueError):
-    """An argument is invalid: for example a wrong length, an infinite value, or a non-orthogonal rotation.
+    """An argument is invalid, for example a wrong length, an infinite value or a non-orthogonal rotation.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")

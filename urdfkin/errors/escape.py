@@ -1,4 +1,4 @@
-"""Escaping of names from files: one function for each output format.
+"""Escape names from files, with one function for each output format.
 
 A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
 spreadsheet formulas. Each function escapes these parts of a name for one format.
@@ -110,7 +110,7 @@ def escape_sequence(c: str) -> str:
 def csv_cell(name: str) -> str:
     r"""Escape a name for a CSV cell: one line that no spreadsheet interprets as a formula.
 
-    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text; `from_csv_cell` removes the apostrophe.
+    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text. `from_csv_cell` removes the apostrophe.
 
     >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
     ("'=cmd|'/C calc'!A0", 'joint1')
@@ -120,7 +120,7 @@ def csv_cell(name: str) -> str:
 
 
 def csv_number_or_text(text: str) -> str:
-    """Escape text for a CSV cell as `csv_cell` does; return a number unchanged.
+    """Escape text for a CSV cell as `csv_cell` does, but return a number unchanged.
 
     >>> csv_number_or_text("-0.5"), csv_number_or_text("-y")
     ('-0.5', "'-y")
@@ -129,5 +129,5 @@ def csv_number_or_text(text: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """Return the name from a cell that `csv_cell` wrote; escaped characters stay escaped."""
+    """Return the name from a cell that `csv_cell` wrote. Escaped characters stay escaped."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA_STARTS) else cell

@@ -33,7 +33,7 @@ DEFAULT_QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_for_language(code: FrameCode, to: str) -> FrameCode:
-    """Return exact code for sympy-exact, otherwise `code`."""
+    """Return `code`, or the code with exact constants if `to` is sympy-exact."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 

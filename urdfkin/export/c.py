@@ -146,7 +146,7 @@ def _function(code: FrameCode, function: Function) -> str:
 def min_configuration_count(code: FrameCode, function: Function) -> int:
     """Return the least number of configurations for which every array has at least eight numbers.
 
-    Arrays without numbers do not count.
+    Empty arrays are ignored.
     """
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)

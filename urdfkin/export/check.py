@@ -43,10 +43,10 @@ _COMPILE_COMMANDS = {
 }
 #: Compiler and options for CUDA if the computer has nvcc and a GPU.
 _GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: The check searches this number of characters at the start of a file.
-#: The check searches for `EXPORT_MARK` and for the word UNVERIFIED.
+#: The check looks for `EXPORT_MARK` and the word UNVERIFIED in this number of characters at the start of a
+#: file.
 _HEADER_LENGTH = 2000
-#: Time limit of a compiler or a test program, s.
+#: Time limit (s) of a compiler or a test program.
 #: The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 

@@ -4,8 +4,8 @@ The first call of a quantity compiles exported C code with the system's compiler
 with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key consists of the C code, the compiler, its options and
-the processor. Linux loads the code from memory. Another program could change a file between the test of its
-checksum and the loading. Other systems load the code from a temporary file.
+the processor. On Linux, urdfkin loads the code from memory. Therefore, no other program can change the code
+after the test of the checksum. On other systems, urdfkin loads the code from a temporary file.
 """
 
 from __future__ import annotations
@@ -203,11 +203,11 @@ class _ExportedRobot(Protocol):
 class CompiledFrame:
     """Compiled functions for one robot frame: the result of `Robot.compile`.
 
-    Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
-    exactly the same result in a batch and in a single call. A wrong shape and a number that is not finite
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
+    has exactly the same result in a batch and in a single call. A wrong shape and a number that is not finite
     raise InputError. The machine code is compared with Pinocchio once, on more than a hundred configurations.
-    After `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of
-    a `CompiledFrame` as unchecked.
+    After `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of a
+    `CompiledFrame` as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -242,7 +242,7 @@ class CompiledFrame:
     ) -> FloatArray:
         """Return T_world_frame (..., 4, 4): eq. 7.77.
 
-        Arguments and errors are those of `Robot.placement`.
+        Arguments and errors are the same as for `Robot.placement`.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").compile("tip")

@@ -78,7 +78,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def exact_angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Replace an angle that is a multiple of pi/12 in double precision, except 0, by a `PiMultiple`."""
+        """Replace a nonzero multiple of pi/12 in double precision by a `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_PI_MULTIPLE_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
@@ -204,7 +204,7 @@ def make_exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Make and check exact functions.
 
-    The test vectors are those of `proof`.
+    The test vectors are taken from `proof`.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(REFERENCE_DIGITS):

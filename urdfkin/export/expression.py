@@ -29,7 +29,7 @@ from typing import Any
 
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: A number in an equation: a float, or a node of the graph.
+#: A number in an equation is a float or a node of the graph.
 Number = Any
 _EQUATION_NUMBERS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
@@ -98,7 +98,7 @@ class Graph:
         return self.make_node(letter, index)
 
     def make_node(self, op: str, *operands: Any) -> Node:
-        """Return the node of an operation; equal operations share a node."""
+        """Return the node of an operation. Equal operations share a node."""
         key = (op, *operands)
         if (node := self._nodes.get(key)) is None:
             node = self._nodes[key] = Node(self, op, operands, len(self._nodes))
@@ -187,7 +187,7 @@ def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
 def find_dependencies(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
     """Return all nodes that the results depend on.
 
-    Operations in `leaves` count as inputs.
+    Operations in `leaves` are treated as inputs.
     """
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:

@@ -9,13 +9,12 @@ Each function computes one quantity of one frame. These expressions are assigned
 
 All other expressions are parts of larger expressions.
 
-**Single precision.** `single_bounds` bounds the rounding errors to first order in eps:
+**Single precision.** `single_bounds` bounds the rounding errors to first order in eps. An operation or
+constant of the code has the value x_i with the rounding error e_i (`urdfkin.kinematics.roundings`). A result
+y has this error and this bound:
 
-    x_i: value of an operation or constant of the code
-    e_i: rounding error of x_i (`urdfkin.kinematics.roundings`)
-    y: a result
-    error of y = sum of e_i dy/dx_i
-    bound of y = sum of |e_i dy/dx_i|
+    `error = sum of e_i dy/dx_i`
+    `bound = sum of |e_i dy/dx_i|`
 
 A backward pass over the operations computes the derivatives.
 """
@@ -46,11 +45,11 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
 INPUT_LETTERS = ("q", "v", "a")
-#: Operations whose result is always assigned to a variable.
+#: The results of these operations are always assigned to variables.
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement of exported code.
 _MAX_STATEMENT_OPERATIONS = 12
-#: Maximum number of results whose derivatives are computed together, to limit memory.
+#: To limit memory, the derivatives of at most this number of results are computed together.
 _RESULTS_PER_PASS = 512
 
 

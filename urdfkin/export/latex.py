@@ -39,7 +39,7 @@ _RESULT_SYMBOLS = {
 
 
 def write(code: FrameCode, to: str = "latex") -> str:
-    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # A LaTeX document has none.
+    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # A LaTeX document has no test vectors.
     joints, coordinates, rates = (
         enumerate(map(latex_text, names), 1) for names in (code.joints, code.coordinates, code.rates)
     )

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import sanitize
 
-#: Maximum length of a name before a prefix and a number are added; MATLAB allows 63 characters in all.
+#: Maximum length of a name without prefix and number. MATLAB allows 63 characters in all.
 _MAX_LENGTH = 40
 _MAX_COMMENT_LENGTH = 80
 
@@ -67,7 +67,7 @@ def comment_name(name: str) -> str:
 def comment_text(text: str) -> str:
     """Replace characters that could end a comment.
 
-    Question marks are replaced too, because of C's trigraphs, such as ??/.
+    Question marks are also replaced, because they begin C's trigraphs, such as ??/.
 
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'

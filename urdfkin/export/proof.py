@@ -233,7 +233,7 @@ def _tolerances_and_scales(
 
 
 def format_decimal(x: Number) -> str:
-    """Return an interval's midpoint as decimal text, at most `REFERENCE_DIGITS` digits.
+    """Return an interval's midpoint as decimal text with at most `REFERENCE_DIGITS` digits.
 
     Return "0.0" for an interval that contains 0.
     """

@@ -30,7 +30,7 @@ class Dialect:
         imports: Import lines. The names of the used functions replace `{}`, for example `cos, sin`.
         values_body: Body of the exported function `_values`.
             `_values` evaluates a function at several configurations.
-        input_format: Pattern of an input's number, such as `q[0]`.
+        input_format: Pattern of the code for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported `check`.
     """
 
@@ -254,20 +254,18 @@ def _torch_module_code(code: FrameCode) -> str:
 
 
 def _rotation_rate_bound(plan: CompiledTree) -> float:
-    """Bound a vector's rotation due to a change of one coordinate.
+    """Bound the angle (rad) by which a vector rotates if one coordinate changes by 1 rad.
 
-        r >= angle (rad) by which a vector rotates if one coordinate changes by 1 rad
-        s: sum of |multiplier| over the revolute joints of one coordinate (mimic rules)
-        r = max(1, largest s)
-        with a floating joint: r = max(3, largest s)
+    For each coordinate, s is the sum of |multiplier| over the revolute joints that follow the coordinate
+    (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the bound is at
+    least 3.
 
-    Derivation of 3: if one component of a unit quaternion changes by t, the body rotates about a fixed axis.
+    Derivation of 3: If one component of a unit quaternion changes by t, the body rotates about a fixed axis.
+    In four dimensions, x is the angle between the quaternion and the component's coordinate axis. At t = 0,
+    the rotation angle has the first three derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third derivative
+    of a product of F rotated unit vectors is at most:
 
-        x: angle between the quaternion and the component's coordinate axis, in four dimensions
-        first three derivatives of the rotation angle at t = 0: 2 sin x, -2 sin 2x, 4 sin 3x
-        third derivative of a product of F rotated unit vectors
-            <= (2 F)^3 + 3 (2 F)(2 F) + 4 F
-            <= (3 F)^3
+        `(2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3`
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(sum_multipliers(plan)[0].max(initial=0.0)))

@@ -146,7 +146,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """The terms of a point's acceleration (7.125), m/s^2."""
+    """The terms of a point's acceleration (7.125), in m/s^2."""
 
     transverse: FloatArray
     centripetal: FloatArray
@@ -168,7 +168,7 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
     """Return the terms of a point's velocity (7.124; 7.59 if v_1 = 0).
 
-    p-dot_0 = w x R p_1 + R v_1 + d-dot_01
+    The velocity is `w x R p_1 + R v_1 + d-dot_01`.
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
@@ -181,7 +181,7 @@ def point_acceleration(
 ) -> AccelerationParts:
     """Return the terms of a point's acceleration (7.125; 7.123 if v_1 = a_1 = 0).
 
-    p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot
+    The acceleration is `alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot`, with p = R p_1.
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -267,7 +267,7 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     """Convert the velocity of frame n to the velocity of the tool.
 
-    d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, in frame 0
+    In frame 0, the linear velocity of the tool is `d-dot_0n + w x d_{n,tool}`.
     """
     velocity, d = as_vectors(velocity, "velocity", 6), as_vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -302,8 +302,8 @@ def pose_rate_inverse(
 ) -> FloatArray:
     """Return C^-1 in x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C (6, 7) has several right inverses C^-1: C C^-1 = I.
-    The returned inverse gives rates perpendicular to the quaternion.
+    For a quaternion, C (6, 7) has several right inverses with `C C^-1 = I`. The function returns the inverse
+    that gives rates perpendicular to the quaternion.
     """
     if representation == QUATERNION:
         return _block_diagonal(quaternion_rate_matrix(quaternion_of(R)))

@@ -19,7 +19,7 @@ section "vectors".
 | `z`, `v`, `a` | a joint's axis, velocity and acceleration; z is fixed to the link before the joint |
 | `p`, `u`, `b` | position, velocity and acceleration of a point in a moving frame |
 | `o`, `u` | angular and linear velocity of a planar or floating joint |
-| `b` | for such a joint: time derivatives of the components of o or u |
+| `b` | time derivatives of the components of o or u |
 
 All vectors of an equation are expressed in the same axes. These are the world's axes, as in the textbook, or
 the link's own axes. In the link's own axes, z and the offset of an `<origin>` are constant.

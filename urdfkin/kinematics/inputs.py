@@ -46,7 +46,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether any element is masked; NumPy's `asarray` ignores masks."""
+    """Return whether any element is masked. NumPy's `asarray` ignores masks."""
     if is_instance(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))

@@ -49,7 +49,9 @@ Length = Any
 
 
 def product(x: Length, y: Length) -> Length:
-    """Return the product x y of two lengths; for nonzero numbers, at least `SMALLEST_NORMAL`.
+    """Return the product x y of two lengths.
+
+    The product of nonzero lengths is at least `SMALLEST_NORMAL`.
 
     >>> product(1e-200, 1e-200) == SMALLEST_NORMAL, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
     (True, 0.0, array([6.]))

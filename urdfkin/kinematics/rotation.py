@@ -13,7 +13,7 @@ The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 | `name` | | Euler sequence with SciPy's name |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-The dots stand for any batch shape; results have the batch shape of the arguments.
+The dots stand for any batch shape. Results have the batch shape of the arguments.
 
 | Argument | InputError for |
 |---|---|
@@ -24,12 +24,12 @@ The dots stand for any batch shape; results have the batch shape of the argument
 
 A user's matrix often has only a few digits. Quaternions, Euler angles and Gram-Schmidt give different
 rotations for the same rounded matrix. `nearest_rotation` and `polar_factor` return the rotation that is
-nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors; `polar_factor` accepts
-errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar decomposition
-M = U H.
+nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors, and `polar_factor`
+accepts errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar
+decomposition M = U H.
 
-A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
-quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
+A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration. The scalar qw is the textbook's
+q0. A quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
 velocity in the fixed frame 0, as in the textbook. With `frame="body"`, functions express the angular velocity
 in the body's own frame. Quaternion rates have no singularity. The integral of an angular velocity is not an
 orientation (example 7.3). Therefore, `integrate_orientation` integrates quaternion rates.
@@ -101,13 +101,14 @@ UNCHANGED_MATRIX_TOLERANCE = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
-    """Return the nearest rotation to a rounded rotation matrix.
+    """Return the nearest rotation to a rotation matrix M, which may be rounded to nine decimals.
 
-    M: a rotation matrix with entries that may be rounded to nine decimals
-    result = M - M (M^T M - I)/2, one Newton step (Bjorck and Bowie)
-    M = U (I + E):  result = U (I - 3/2 E^2)
-    |E| <= 3e-9
-    error <= 3/2 |E|^2 <= 1.4e-17, an eighth of eps/2 = 1.1e-16
+    The result is one Newton step (Bjorck and Bowie):
+
+        `M - M (M^T M - I)/2`
+
+    With M = U (I + E), the result is U (I - 3/2 E^2). Since |E| <= 3e-9, the error is at most 3/2 |E|^2,
+    about 1.4e-17. This is an eighth of eps/2 = 1.1e-16.
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -208,7 +209,7 @@ def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 def rotation_from_quaternion(quat: ArrayLike) -> FloatArray:
     """Return a unit quaternion's rotation.
 
-    R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q)
+    The rotation matrix is `(q0^2 - q.q) I + 2 q q^T + 2 q0 S(q)`.
     """
     rows = eq.rotation_of_quaternion(*np.moveaxis(normalise_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
@@ -238,7 +239,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
     """Multiply two quaternions of any length.
 
-    R(left right) = R(left) R(right)
+    The product's rotation is `R(left) R(right)`.
     """
     left, right = as_vectors(left, "left", 4), as_vectors(right, "right", 4)
     p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
@@ -258,9 +259,8 @@ ExpressedIn = Literal["fixed", "body"]
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
     """Return E in (q-dot, q0-dot) = E w (7.57).
 
-    frame="fixed":  E = 1/2 [q0 I - S(q); -q^T]
-    frame="body":   E = 1/2 [q0 I + S(q); -q^T]
-    E^T E = I/4,  E^T (q, q0) = 0
+    For the fixed frame, E is `1/2 [q0 I - S(q); -q^T]`. For the body frame, E is `1/2 [q0 I + S(q); -q^T]`.
+    In both cases, `E^T E = I/4` and `E^T (q, q0) = 0`.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -336,7 +336,7 @@ def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return Rodrigues' rotation (7.28).
 
-    R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi)
+    The rotation matrix is `I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi)`.
     """
     axis = as_unit_vectors(axis, "axis")
     angle = as_finite(angle, "angle")[..., np.newaxis, np.newaxis]
@@ -461,7 +461,7 @@ def _make_sequence(name: str) -> EulerSequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz for the axis 0, 1 or 2; the constant entries are exactly 0 and 1."""
+    """Return Rx, Ry or Rz for the axis 0, 1 or 2. The constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -475,7 +475,7 @@ def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
 def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
     """Return the rotation of Euler angles.
 
-    R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
+    For "ZYZ", the rotation is `Rz(phi) Ry(theta) Rz(psi)`.
     """
     axes = find_sequence(name)
     turns = axes.reorder(as_vectors(angles, "angles"))
@@ -567,13 +567,16 @@ def euler_rates(
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE) -> FloatArray:
     """Return Omega^-1 in closed form (7.56).
 
-    F:              rotation by the first angle
-    w' = F^T w:     w in the frame after F
-    r_1, r_2, r_3:  rates of the three angles
-    w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)
-    r_3 = w'_other / across
-    r_2 = w'_second
-    r_1 = w'_first - along r_3
+    F is the rotation by the first angle, and w' = F^T w. The rates r_1, r_2 and r_3 of the three angles
+    satisfy:
+
+        `w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)`
+
+    The three components of this equation give the rates:
+
+        `r_3 = w'_other / across`
+        `r_2 = w'_second`
+        `r_1 = w'_first - along r_3`
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)

@@ -2,12 +2,11 @@
 
 All tolerances of urdfkin use these bounds:
 
-    tolerance = count * eps * scale
-    eps = 2^-52
-    error of one operation <= eps/2 times the rounded number
-    scale = upper bound on the sum of the absolute values of the result's terms
+    `tolerance = count * eps * scale`
 
-This module defines the counts, to first order in eps.
+The number eps is 2^-52. The error of one operation is at most eps/2 times the rounded number. The scale is an
+upper bound on the sum of the absolute values of the result's terms. This module defines the counts, to first
+order in eps.
 
 | Scale | Module |
 |---|---|
@@ -63,15 +62,15 @@ If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix
 | standard deviation of uniformly distributed rounding errors | 3.3 |
 | `PINOCCHIO_ROUNDINGS`, seven times this standard deviation | 24 |
 
-Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis:
+Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. The rotation Q turns the
+file's axis to the coordinate axis. The angle t of Q is the tilt. The replacement changes the joint's rotation
+R by at most 2 t:
 
-    Q: rotation that turns the file's axis to the coordinate axis
-    t: angle of Q, the tilt
-    |Q R Q^T - R| <= 2 |Q - 1| <= 2 t
-    error of a rotated vector, or of a translation along the axis <= 2 t
-    additional error of each factor, for all frames after the joint = 2 t = (2 t / eps) eps
+    `|Q R Q^T - R| <= 2 |Q - 1| <= 2 t`
 
-If t > eps, urdfkin reports the finding URDF514.
+Therefore, a rotated vector and a translation along the axis have an error of at most 2 t. For all frames
+after the joint, each factor has the additional error 2 t, which is 2 t / eps in eps. If t > eps, urdfkin
+reports the finding URDF514.
 
 **An export.** Exported code (`urdfkin.export`) computes the same equations, with these changes:
 
@@ -116,13 +115,12 @@ The counts of an export's joint are
 
 The errors of an export and of urdfkin have the same standard deviation.
 
-**Single precision.** `urdfkin.export.function` computes a bound for each number of a test vector:
+**Single precision.** `urdfkin.export.function` computes a bound for each number of a test vector. Each
+operation and each constant has a value x. The bound is the sum of these products over all x:
 
-    eps = 2^-23
-    x: value of an operation or of a constant
-    bound = sum over all x of (rounding error of x) * |derivative of the result with respect to x|
+    `(rounding error of x) * |derivative of the result with respect to x|`
 
-The error of one operation is
+With eps = 2^-23, the error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -197,9 +195,9 @@ The counts, with u = eps/2, are
 
 **MJCF equalities.** The tree's mimic rules satisfy an equality in an MJCF file up to rounding:
 
-    equality: y - y0 = c0 + c1 (x - x0)
-    x, y: values of two joints
-    x0, y0: reference values
+    `y - y0 = c0 + c1 (x - x0)`
+
+The numbers x and y are the values of two joints. The numbers x0 and y0 are reference values.
 
 | | |
 |---|---|
@@ -209,16 +207,15 @@ The counts, with u = eps/2, are
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
 | sum, at most `MJCF_MIMIC_ROUNDINGS` = 8 | 7.5 |
 
-    tolerance = MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)
-    k: number of mimic rules between the mimic joint and the independent joint
+With k mimic rules between the mimic joint and the independent joint, the tolerance is:
 
-**Numbers near zero.** A product below the smallest normal number loses bits:
+    `MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)`
 
-    n = smallest normal number
-    smallest subnormal number = eps n = 2^-1074
-    error of the product <= eps n / 2 = 2^-1075
-    every scale except 0 >= n (`urdfkin.kinematics.number_kinds`)
-    tolerance = count * eps * scale >= count * eps n > 2^-1075
+**Numbers near zero.** A product below the smallest normal number n loses bits. The smallest subnormal number
+is eps n = 2^-1074, so the error of the product is at most 2^-1075. Every nonzero scale is at least n
+(`urdfkin.kinematics.number_kinds`). Therefore, the tolerance is larger than this error:
+
+    `count * eps * scale >= count * eps n > 2^-1075`
 
 A later product with a large number multiplies the error and the scale by the same factor.
 
@@ -291,10 +288,9 @@ SINGLE_POLYNOMIAL_ERROR = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference of the constant poses that two programs compute from the same file, in eps per joint.
-#: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
-#: These four counts are in rows 1 and 3 of the first table in the docstring above.
-#: Standard deviation: 2.4 eps.
-#: 13.7 eps / 2.4 eps = 5.7.
+#: The largest possible difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
+#: The four counts are in rows 1 and 3 of the table "A joint" in the docstring above.
+#: The standard deviation is 2.4 eps, so the allowed difference is 5.7 standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Rounding errors in the directions of two joint axes, in eps.
 #: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
@@ -319,9 +315,8 @@ LENGTH_ROUNDINGS = 4.0
 #: The rounding of a file's angle to a double has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
-#:
-#:     entry = a x - b y:               0.75
-#:     x = c d - e f,  y = g h - k l:   0.75
+#: An entry is `a x - b y`, and this difference has an error of 0.75.
+#: The factors x and y are differences of two products, also with an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
 #: A length is rounded to twelve digits if the change is at most this number times eps times the path length.
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
@@ -364,9 +359,7 @@ def table_roundings(rows: int) -> float:
 
 
 def written_urdf_roundings(rows: int) -> float:
-    """Return the allowed difference (eps) between the poses of a table and of its URDF.
-
-    The URDF was written from the table:
+    """Return the allowed difference (eps) between a table's pose and the pose of the URDF written from it.
 
     | Error | Multiple of `table_roundings(rows)` |
     |---|---|

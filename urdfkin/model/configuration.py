@@ -318,7 +318,7 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def named_poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named poses.
 
-    In `ready`, joints without a value are at 0, or mid-range if 0 is outside.
+    In `ready`, a joint without a value is at 0. If 0 is outside its range, the joint is in the middle.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():

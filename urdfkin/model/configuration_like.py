@@ -238,7 +238,7 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
 
 
 def _labels(value: object) -> list[Any]:
-    """Return a table's labels; the default labels 0, 1, 2, ... are ignored."""
+    """Return a table's labels. The default labels 0, 1, 2, ... are ignored."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []

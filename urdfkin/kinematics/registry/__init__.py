@@ -186,7 +186,7 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 def explain(number: str) -> str | None:
     """Return the text about an equation.
 
-    `number` is, for example, "7.130" or "(7.130)"; other text gives None.
+    `number` is, for example, "7.130" or "(7.130)". Return None for other text.
     """
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST_EQUATION:

@@ -268,7 +268,7 @@ def as_toml(convention: Convention) -> str:
 
 
 def _quote(text: str) -> str:
-    """Quote as JSON does; TOML also requires an escape for DEL."""
+    """Quote as JSON does. TOML also requires an escape for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -320,16 +320,15 @@ def make_identifier(name: str) -> str:
 def encode_usd_name(name: str) -> str:
     """Transcode a name as `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    An identifier is returned unchanged.
+    An identifier is returned unchanged. Every other name is encoded as "tn__", the kept characters, "_" if
+    any character is kept, and numbers. The kept characters are ASCII letters, digits and "_". Each other
+    character gives the number d n + p in base 62, as in Punycode, in the order of the code points:
 
-        result:   "tn__" + kept characters + "_" if any character is kept + numbers
-        kept:     letters, digits and "_" (ASCII)
-        numbers:  d n + p in base 62 for each other character, as in Punycode,
-                  in the order of the code points
-
-        d:   code point minus the previous code point (at first 0)
-        n:   number of possible positions
-        p:   position among the characters that are already encoded
+    | Symbol | Meaning |
+    |---|---|
+    | d | code point minus the previous code point (at first 0) |
+    | n | number of possible positions |
+    | p | position among the characters that are already encoded |
 
     Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 

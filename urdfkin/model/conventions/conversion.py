@@ -359,7 +359,7 @@ class Conversion:
 
     @property
     def is_constant(self) -> bool:
-        """Whether `matrix` is independent of q."""
+        """True if `matrix` does not depend on q."""
         how = self.convention
         return not any(
             block.joint.kind is JointKind.PLANAR or "parent" in (how.linear, how.angular)
@@ -516,7 +516,7 @@ class Conversion:
     def _to_target_rates(
         self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M x + M' v for x = `own_rates`; return M x if `v` is None."""
+        """Return M x + M' v for x = `own_rates`, or M x if `v` is None."""
         if self._same_v:
             return own_rates
         rates: FloatArray = own_rates[..., self._v_index]
@@ -535,7 +535,7 @@ class Conversion:
     def _from_target_rates(
         self, q: FloatArray, target_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M^-1 (x - M' v), or M^-1 x without v; x is `target_rates`."""
+        """Return M^-1 (x - M' v) for x = `target_rates`, or M^-1 x if `v` is None."""
         if self._same_v:
             return target_rates
         rates: FloatArray = target_rates[..., self._v_target_index]
@@ -615,7 +615,7 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the joint's part of `matrix`: (..., 3, 3) if planar, (..., 6, 6) if floating.
+        """Return the joint's part of `matrix`, (..., 3, 3) for a planar or (..., 6, 6) for a floating joint.
 
         `q` is the robot's q. If the joint's velocity v is given, return the part's time derivative.
         """
@@ -665,7 +665,7 @@ class Conversion:
         return self.columns(q, self.reorder_six_vector(J, -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the columns of a matrix J to the target program: J M^-1.
+        """Convert the columns of a matrix J to the target program, as J M^-1.
 
         Each row of J must have the same meaning in both conventions.
 
