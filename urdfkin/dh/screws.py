@@ -1,11 +1,11 @@
-"""Compute a path's product of exponentials, in Lynch and Park's form: a zero pose and a screw per joint.
+"""Compute a path's product of exponentials, in the form of Lynch and Park.
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in the
-book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w. For a
-prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame; body screws B =
-Ad(M^-1) S are in the tip frame.
+M is the tip's pose in the zero configuration. Each joint has a screw (w, v), with the **angular part first**,
+as in the book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w.
+For a prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame. Body screws
+B = Ad(M^-1) S are in the tip frame.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from urdfkin.model.tree import (
 #: Tolerance of handwritten screws and of M.
 #: The length of an axis vector may differ from 1 by this number.
 #: The pitch (m/rad) of a screw may differ from 0 by this number.
-#: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
+#: For the rotation matrix R in M, the entries of R R^T may differ from the identity by this number.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -65,8 +65,8 @@ class ProductOfExponentials(Displayable):
     Attributes:
         joints: The joints, base to tip.
         M: (4, 4) pose of the tip in the base frame, in the zero configuration (metres).
-        space: (n, 6) screws (w, v) in the base frame. Revolute: w in rad/rad, v in m/rad. Prismatic: w = 0,
-            v in m/m.
+        space: (n, 6) screws (w, v) in the base frame. The units for a revolute joint are rad/rad and m/rad.
+            For a prismatic joint, w is 0 and v is in m/m.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
@@ -94,7 +94,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def body(self) -> FloatArray:
-        """(n, 6) screws in the tip frame: B = Ad(M^-1) S.
+        """(n, 6) screws B = Ad(M^-1) S in the tip frame.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").body[1].tolist()
@@ -116,7 +116,7 @@ class ProductOfExponentials(Displayable):
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis nearest to the base's origin.
+        """(n, 3) points: the point of each revolute axis that is nearest to the base's origin.
 
         A prismatic joint has the point of the previous joint.
 
@@ -149,11 +149,9 @@ class ProductOfExponentials(Displayable):
     def path(self) -> Path:
         """The product as rotations about z axes and translations along z axes.
 
-            revolute             exp([S] q) = A Rz(q) A^-1
-            prismatic            exp([S] q) = A Tz(q) A^-1
-            z axis of A          along the joint's axis
-            constant poses       A_i^-1 A_{i+1}
-            last constant pose   A_n^-1 M
+        For a revolute joint, exp([S] q) is A Rz(q) A^-1. For a prismatic joint, it is A Tz(q) A^-1. The z
+        axis of A is along the joint's axis. The constant poses are A_i^-1 A_{i+1}, and the last one is A_n^-1
+        M.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").path.poses(np.zeros(2))[:3, 3].tolist()
@@ -170,7 +168,8 @@ class ProductOfExponentials(Displayable):
     def roundings(self) -> float:
         """Bound of the rotation's rounding error in `placement`, in units of eps.
 
-        The bound is twice that of a Denavit-Hartenberg table of the path. Rounding of q is not included.
+        The bound is twice the bound for a Denavit-Hartenberg table of the path. The bound does not include
+        the rounding of q.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
@@ -195,8 +194,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        The frame of the link NAME_link has its origin on the axis of the joint NAME.
-        In the zero configuration, this frame is parallel to the base frame.
+        For example, link `joint_1_link` has its frame's origin on the axis of `joint_1`.
+        In the zero configuration, all link frames are parallel to the base frame.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
@@ -257,7 +256,7 @@ def make_screws(path: FrameChain) -> ProductOfExponentials:
 
 
 def _nearest_rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to M; an exact M is unchanged."""
+    """Return the rigid transform nearest to M. An exact M is returned unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -285,8 +284,8 @@ def screws_from_rows(
     URDF has no joint with a pitch, so w . v must be 0.
 
     Args:
-        screws: (n, 6) rows (w, v); also (6, n) if n is not 6.
-        M: (4, 4) or (3, 4) pose of the tip in the zero configuration, m.
+        screws: (n, 6) rows (w, v). The shape (6, n) is also allowed, unless n is 6.
+        M: (4, 4) or (3, 4) pose of the tip in the zero configuration, with the translation in m.
         frame: Frame of the screws: "space" (base) or "body" (tip).
         joints: Joint names.
         robot: The robot's name.

@@ -1,7 +1,7 @@
 """Snap angles to multiples of 15 degrees, and compute the effect on the tip.
 
 To snap an angle means to replace the angle by the nearest multiple of 15 degrees. An angle is snapped only if
-it differs from this multiple by at most a tolerance. Three kinds of angles are snapped:
+the change is at most the tolerance. Three kinds of angles are snapped:
 
 1. roll, pitch and yaw of each joint's origin in the URDF;
 2. the tilt between consecutive axes, and the rotations about these axes;
@@ -38,7 +38,7 @@ from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, lar
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: Largest permitted tolerance, rad.
-#: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
+#: Below 7.5 degrees, only one multiple of 15 degrees can be within the tolerance of an angle.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
@@ -64,7 +64,7 @@ def snap_chain(
     """Snap the angles of a chain.
 
     Returns:
-        The chain, and a pair (k, change) for each change of a constant pose A_k.
+        The snapped chain, and a pair (k, change) for each changed pose A_k.
     """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
@@ -90,7 +90,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A prismatic axis may have been shifted to the origin of the previous joint.
+            # The table can contain a prismatic axis that was shifted to the origin of the previous joint.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_make_change(exact, pivot, what, angle), row=i))
@@ -131,7 +131,7 @@ def sample_within_limits(table: DHTable) -> FloatArray:
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
     """Return the angles (rad) between rotations (..., 3, 3).
 
-    |R - S| = 2 sqrt2 sin(angle / 2)
+    The angle satisfies `|R - S| = 2 sqrt2 sin(angle / 2)` in the Frobenius norm.
     """
     chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
@@ -154,11 +154,10 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
 
 
 def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
-    """Snap the angles of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Snap roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    # In gimbal lock, only roll + yaw or roll - yaw is defined.
-    # Therefore, roll is set to 0.
+    # In gimbal lock, only roll + yaw or roll - yaw is defined, so roll is set to 0.
     if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
@@ -170,7 +169,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     """Snap the angles of Rz(phi) Rx(tilt) Rz(psi).
 
     Returns:
-        The new pose, and the angle from the old to the new rotation (rad).
+        The new pose, and the angle (rad) between the old and the new rotation.
     """
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
@@ -225,9 +224,9 @@ def _changes_of_origins(
 
 
 def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """The change rotates the rest of the chain about the origin of joint k.
+    """Describe a rotation of the rest of the chain about the origin of joint k.
 
-    k is 0 for the base, 1 for the first joint, and n + 1 for the tip.
+    The base has k = 0, the first joint has k = 1, and the tip has k = n + 1.
     """
     prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)
@@ -265,7 +264,7 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def travel_condition(table: DHTable) -> str:
-    """Return the condition on the joint values under which a bound on the tip's displacement holds, or ""."""
+    """Return the condition under which a bound on the tip's displacement holds, or "" without a condition."""
     condition = "prismatic joints are within their limits"
     if all(row.kind.turns for row in table.rows):
         return ""

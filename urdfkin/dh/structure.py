@@ -1,8 +1,8 @@
 """Find the structure of an arm, and export the structure for closed-form inverse kinematics solvers.
 
 Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
-point (Pieper, 1968). Distances and angles of consecutive axes are the same in every configuration, so they
-are computed in the zero configuration.
+point (Pieper, 1968). The distance and the angle of two consecutive axes do not depend on the configuration.
+Therefore, they are computed in the zero configuration.
 
 An ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et al., 2014) has the standard table
 
@@ -39,8 +39,8 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Singular values below this number count as zero.
-#: Rounding errors of singular values are far below this number.
+#: Singular values below this number are treated as zero.
+#: The rounding errors of singular values are much smaller.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
 #: Default tolerance of `find_opw` (metres and rad).
@@ -59,7 +59,7 @@ class AxisPair:
 
     Attributes:
         angle: Angle between the axes, at most pi/2 rad.
-        distance: Distance between the axes, m; 0 if a joint is prismatic.
+        distance: Distance (m) between the axes, or 0 if a joint is prismatic.
     """
 
     first: str
@@ -75,8 +75,8 @@ class StructureKind:
     Attributes:
         radians: Largest deviation of an angle.
         metres: Largest deviation of a length.
-        at: Centre of a spherical wrist, shoulder or joint, m; None for all other properties. The centre is in
-            the base frame and the zero configuration.
+        at: Centre (m) of a spherical wrist, shoulder or joint, in the base frame and the zero configuration.
+            For other properties, the centre is None.
     """
 
     name: str
@@ -94,15 +94,16 @@ class StructureKind:
 class Structure:
     """The geometric structure of a path.
 
-    `reach` and `sampled_reach` are distances of the tip from `reach_from`.
+    `reach` and `sampled_reach` are distances between the tip and `reach_from`.
     Prismatic joints without limits are sampled within `ASSUMED_LIMIT`.
 
     Attributes:
-        joints: A letter for each joint, R or P.
+        joints: A letter for each joint: R for revolute, P for prismatic.
         freedoms: Rank of the Jacobian at a random configuration.
-        reach: Upper bound (m) within the joint limits; infinite if a prismatic joint has no limits.
-        sampled_reach: Largest sampled distance, m.
-        reach_from: Point in the base frame (m), independent of q.
+        reach: Upper bound (m) of the distance within the joint limits. The bound is infinite if a prismatic
+            joint has no limits.
+        sampled_reach: Largest sampled distance (m).
+        reach_from: Point (m) in the base frame that does not depend on q.
         reach_point: Description of `reach_from`.
     """
 
@@ -168,7 +169,7 @@ def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -
     """Return the least-squares intersection of axes.
 
     Returns:
-        The point, and its largest distance to an axis (m).
+        The point (3,), and the largest distance (m) between the point and an axis.
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
@@ -217,7 +218,7 @@ def _find_arm_kinds(
 
 
 def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the closed-form solvers for the arm. Approximate properties of the arm count as exact."""
+    """Return the closed-form solvers for the arm, as if its approximate properties were exact."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:
@@ -263,11 +264,11 @@ def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Bound the tip's distance from `origin`.
+    """Bound the distance between `origin` and the tip.
 
-    p_0 = origin
-    p_i: point of the next revolute axis that is nearest to p_{i-1}
-    bound = |p_1 - p_0| + ... + |p_n - p_{n-1}| + |tip - p_n| + travel of the prismatic joints
+    The points p_0 to p_n lead from `origin` to the last revolute axis. Each point p_i is the point of the
+    next revolute axis that is nearest to p_{i-1}. The bound is the sum of the distances between consecutive
+    points, the distance between p_n and the tip, and the travel of the prismatic joints.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -285,7 +286,7 @@ def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray
     """Sample tip positions without mimic rules.
 
     Returns:
-        Tip positions at all samples, and the Jacobian at the first sample.
+        The tip positions at all samples, and the Jacobian at the first sample.
     """
     ranges = [joint_value_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
@@ -296,7 +297,7 @@ def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray
 class OpwParameters:
     """The OPW parameters of an arm.
 
-        q_opw = sign * q - offset
+    The solver's joint values are `q_opw = sign * q - offset`.
 
     Attributes:
         base: T_base_opw.
@@ -311,9 +312,11 @@ class OpwParameters:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return base . F(sign * q - offset) . tool.
+        """Return the pose of the tip in the base frame.
 
-        F is the solver's forward kinematics.
+        F is the solver's forward kinematics, and the pose is:
+
+            `base F(sign * q - offset) tool`
         """
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
@@ -419,7 +422,7 @@ def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArr
 
     All joints must be revolute.
     The vector P_0 begins at the base's origin, and P_n ends at the tip's origin.
-    Solvers detect intersecting axes by an exactly zero vector.
+    The vector between two intersecting axes is exactly zero, because solvers test for zero.
 
     Returns:
         (n, 3) unit axes, and (n + 1, 3) vectors, m.
@@ -431,7 +434,8 @@ def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArr
 def _choose_axis_points(screws: ProductOfExponentials) -> FloatArray:
     """Return a point of each axis; intersecting axes have the same point.
 
-    Three axes have priority over two, and later intersections over earlier ones.
+    An intersection of three axes has priority over an intersection of two axes. Among intersections of the
+    same number of axes, the last one on the path has priority.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

@@ -7,12 +7,13 @@ A table represents a product of two kinds of transforms (section 7.5 of the text
 
 The two conventions group these transforms differently into rows:
 
-    standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
-    modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
+    standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool
+    modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool
 
-The variable of row i is theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable
-is the constant in the row plus `sense` times the joint's value. The standard convention is the textbook's:
-z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+Row i contains S_i and one X: X_i in a standard table, X_{i-1} in a modified table. The variable of row i is
+theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable is the constant in the
+row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis of
+joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ from urdfkin.system.lazy_import import get_hook
 class DHConvention(StrEnum):
     """Convention of a table.
 
-    standard (distal): joint i has the axis z_{i-1}
-    modified (Craig): joint i has the axis z_i
+    In a standard (distal) table, joint i has the axis z_{i-1}. In a modified table (Craig), joint i has the
+    axis z_i.
     """
 
     STANDARD = "standard"
@@ -66,16 +67,16 @@ class DHRow:
     """One row of a table: constant parameters in metres and radians.
 
     Attributes:
-        a: Length along x; a_{i-1} in a modified table.
-        alpha: Rotation about x; alpha_{i-1} in a modified table.
+        a: Length along x. In a modified table, row i contains a_{i-1}.
+        alpha: Rotation about x. In a modified table, row i contains alpha_{i-1}.
         d: Offset along the joint's axis, with the joint at zero.
         theta: Rotation about the joint's axis, with the joint at zero.
         kind: Revolute, continuous or prismatic.
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
-        beta: Rotation about y after alpha; 0 except in a Hayati row.
-        mimic: The mimic rule; None if the joint has its own coordinate.
-        limit: The joint's limits; None without limits.
+        beta: Rotation about y after the rotation about x. Only a Hayati row has a nonzero beta.
+        mimic: The mimic rule, or None for an independent joint.
+        limit: The joint's limits, or None.
 
     Raises:
         InputError: a number is not finite, `sense` is neither 1 nor -1, or the joint is fixed, planar or
@@ -127,12 +128,11 @@ class DHRow:
 
     @property
     def distance_to_normal(self) -> float:
-        """Distance (m) of two points on the next axis; 0 except in a Hayati row.
+        """Distance (m), along the next axis, between the row's x axis and the end of the common normal.
 
-            first point    intersection with the Hayati row's x axis
-            second point   end of the common normal
+        The distance is 0 except in a Hayati row. With the angle `tilt` between the two joint axes, it is:
 
-            distance = |a sin(beta)| / sin^2(tilt)
+            `|a sin(beta)| / sin^2(tilt)`
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].distance_to_normal
@@ -162,17 +162,18 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: An angle looks round if |angle - nonzero multiple of 15 degrees| <= this number * 15 degrees.
+#: An angle looks round if it is near a nonzero multiple of 15 degrees.
+#: The largest difference is this number times 15 degrees.
 _ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6
 
 
 def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """Return S = Rz(theta) Tz(d); radians and metres.
+    """Return S = Rz(theta) Tz(d), with theta in radians and d in metres.
 
     Returns:
-        (..., 4, 4) poses; the arguments broadcast.
+        (..., 4, 4) poses. The arguments broadcast.
     """
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
@@ -185,7 +186,7 @@ def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
 
 
 def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
-    """Return X = Tx(a) Rx(alpha) Ry(beta); metres and radians."""
+    """Return X = Tx(a) Rx(alpha) Ry(beta), with a in metres and both angles in radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
         [
@@ -201,7 +202,7 @@ def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
     """Factor a pose into Tx(a) Rx(alpha).
 
     Returns:
-        None if the pose has another form.
+        (a, alpha), or None if the pose has another form.
 
     >>> as_a_and_alpha(link_transform(0.5, math.pi))
     (0.5, 3.141592653589793)
@@ -241,7 +242,7 @@ def clean_angle(angle: float) -> float:
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is nearly a nonzero multiple of `twelfth`.
+    """Return whether an angle is nearly a nonzero multiple of `twelfth`.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -256,13 +257,14 @@ def nearest_twelfth(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """An angle that was rounded to a multiple of 15 degrees.
+    """The change of one angle to a multiple of 15 degrees.
 
     Attributes:
-        row: Index of the row; -1 is the base, n the tool.
-        angle: Rotation of the rest of the chain, rad.
-        lever: Bound of the tip's distance (m) from the rotation's centre, with prismatic joints at zero.
-        prismatic_joints: Prismatic joints between this centre and the tip.
+        row: Index of the row. The base has the index -1, and the tool has the index n.
+        angle: Angle (rad) by which the change rotates the rest of the chain.
+        lever: Upper bound of the distance (m) between the rotation's centre and the tip. Prismatic joints are
+            at zero.
+        prismatic_joints: Prismatic joints between the rotation's centre and the tip.
     """
 
     row: int
@@ -281,19 +283,19 @@ class SnapChange:
 class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
-    Each change rotates the rest of the chain about a joint's origin:
+    Each change rotates the rest of the chain about a joint's origin, and moves the tip by at most:
 
-        displacement of the tip <= sum of angle * distance from this origin to the tip
+        `angle * distance from the joint's origin to the tip`
 
     Attributes:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
-        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits. The bound
-            assumes that a prismatic joint without limits travels at most 10 m.
+        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits, and
+            within 10 m of zero for a prismatic joint without limits.
         radians: Guaranteed bound of the tip's rotation.
-        per_metre: Increase of the bound per metre of travel, by prismatic joint.
-        measured_metres: Largest distance between the tips of the exact path and of the table, in samples.
-        measured_radians: Largest angle between these two tip frames, in samples.
+        per_metre: For each prismatic joint, the increase of the bound per metre of travel.
+        measured_metres: Largest displacement of the tip in the sampled configurations.
+        measured_radians: Largest rotation of the tip in the sampled configurations.
         samples: Number of sampled configurations.
     """
 
@@ -315,9 +317,9 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a guaranteed bound (...,) of the tip's displacement by the snapped angles (m).
+        """Return a guaranteed bound (...,) of the tip's displacement (m) due to the snapped angles.
 
-        `values` are the prismatic joints' values by name.
+        `values` contains the values of the prismatic joints by name.
         """
         at_zero = sum(change.tip_displacement for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
@@ -326,7 +328,9 @@ class SnapReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Displayable):
-    """A Denavit-Hartenberg table of a path; `urdfkin.load(table)` returns a robot.
+    """A Denavit-Hartenberg table of a path.
+
+    `urdfkin.load(table)` returns a robot.
 
     Attributes:
         convention: Standard or modified.
@@ -336,7 +340,7 @@ class DHTable(Displayable):
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        snap: The effect of rounded angles; None for an exact table.
+        snap: The effect of snapped angles, or None for an exact table.
 
     Raises:
         InputError: the convention is unknown, two rows name the same joint, or base or tool is not a rigid
@@ -391,7 +395,7 @@ class DHTable(Displayable):
         """Return the table in Markdown.
 
         Args:
-            angles: "radians" (exact multiples of pi/12 as fractions of pi) or "degrees".
+            angles: "radians" or "degrees". In radians, exact multiples of pi/12 become fractions of pi.
             lengths: "metres" or "millimetres".
             digits: Significant digits.
 
@@ -408,7 +412,7 @@ class DHTable(Displayable):
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in LaTeX (amsmath, booktabs, graphicx).
 
-        The arguments are those of `to_markdown`.
+        The arguments are the same as for `to_markdown`.
 
         >>> import urdfkin
         >>> "tabular" in urdfkin.load("planar_two_link").dh("tip", "base").to_latex()
@@ -419,7 +423,7 @@ class DHTable(Displayable):
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in HTML.
 
-        The arguments are those of `to_markdown`.
+        The arguments are the same as for `to_markdown`.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -456,8 +460,7 @@ class DHTable(Displayable):
     def joint_names(self) -> tuple[str, ...]:
         """Names of the coordinates, in row order.
 
-            row of an independent joint   the joint's own name
-            row of a mimic joint          the name of the mimicked joint, listed only once
+        The row of a mimic joint has the name of the mimicked joint. Each name is listed once.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").joint_names
@@ -469,7 +472,7 @@ class DHTable(Displayable):
 
     @property
     def has_hayati_rows(self) -> bool:
-        """Whether any row has a fifth parameter, beta.
+        """True if any row has a fifth parameter, beta.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").has_hayati_rows
@@ -481,7 +484,7 @@ class DHTable(Displayable):
     def unlimited(self) -> tuple[str, ...]:
         """Names of the prismatic joints without limits.
 
-        Bounds assume that these joints stay within 10 m of zero.
+        Error bounds assume that joints without limits stay within 10 m of zero.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").unlimited
@@ -503,13 +506,11 @@ class DHTable(Displayable):
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 
-        The bound divided by `span` bounds the orientation error in radians.
+            `eps * (8 (n + 1) + sum of |angles|) * length`
 
-            bound = eps * (8 (n + 1) + sum of |angles|) * length
-            angles: values of the revolute joints
-            length: `span` + sum of |values of the prismatic joints| + length of the base's translation
-
-        `urdfkin.kinematics.roundings` derives the factor 8.
+        The angles are the values of the revolute joints. The length is the sum of `span`, the absolute values
+        of the prismatic joints, and the length of the base's translation. The bound divided by `span` bounds
+        the orientation error in radians. `urdfkin.kinematics.roundings` derives the factor 8.
 
         >>> import urdfkin
         >>> bool(urdfkin.load("planar_two_link").dh("tip", "base").rounding([0.0, 0.0]) < 1e-13)
@@ -527,7 +528,7 @@ class DHTable(Displayable):
         The bounds cover rounding errors and the effect of snapped angles.
 
         Returns:
-            (...,) bounds in metres, and in radians.
+            Two bounds (...,), the first in metres and the second in radians.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -550,7 +551,7 @@ class DHTable(Displayable):
 
         Args:
             q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or
-                text). None: the zero configuration.
+                text). None means the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -576,9 +577,7 @@ class DHTable(Displayable):
         return Path(tuple(steps))
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
-        """Return the (..., 4, 4) pose T_base_tip.
-
-        The pose is the product of base, rows and tool.
+        """Return the (..., 4, 4) pose T_base_tip, the product of base, rows and tool.
 
         Args:
             q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or

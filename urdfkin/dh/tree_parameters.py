@@ -1,18 +1,18 @@
 """Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame, whose axis z_j is along the axis of the link's own joint. The antecedent of link j is
-the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this pose in
-frame i:
+link j has one frame. The axis z_j of the frame is the axis of joint j, which moves link j. The antecedent of
+link j is the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this
+pose in frame i:
 
-    T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
+    `T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r)`
 
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
-child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table has
-the form of the modified Denavit-Hartenberg table. The parameter d is then called a(i-1) in the modified
-table, and the parameter r is called d(i). Frame 0, the last row and parallel axes follow other rules. The
-angle beta is not part of the original notation, and is zero unless two axes are nearly parallel. Without
-beta, nearly parallel axes may need offsets of kilometres (Hayati).
+child of link i. Therefore, gamma and b of the first moving child are zero. For a chain without branches, the
+table has the form of the modified Denavit-Hartenberg table. The modified table writes a(i-1) instead of d,
+and d(i) instead of r. These rules do not apply to frame 0, the last row and parallel axes. The original
+notation has no angle beta. The angle is zero unless two axes are nearly parallel. Without beta, nearly
+parallel axes may need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ class TreeRow:
     The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Row index, from 0, of the nearest moving link towards the root; -1 is the root.
-        sigma: 0 revolute, 1 prismatic, 2 fixed.
-        mimicked_joint: The mimicked joint; without a mimic rule, the joint itself.
-        multiplier: value = multiplier * mimicked value + offset
+        antecedent: Row index of the antecedent, from 0, or -1 for the root.
+        sigma: 0 for a revolute, 1 for a prismatic and 2 for a fixed joint.
+        mimicked_joint: The mimicked joint, or the joint itself without a mimic rule.
+        multiplier: Multiplier of the mimic rule.
     """
 
     joint: str
@@ -81,9 +81,9 @@ class TreeParameters:
     """The table of a whole robot.
 
     Attributes:
-        path_lengths: (joints,) path lengths from the root to the joint origins in the URDF, m.
+        path_lengths: (joints,) path lengths (m) from the root to the joint origins in the URDF.
         T_frame_link: (joints, 4, 4) poses of the URDF link frames in the rows' frames.
-        zeroed_tilt: Largest sum of the tilts set to zero on a path from the root, rad.
+        zeroed_tilt: Largest sum (rad) of the zeroed tilts along a path from the root.
     """
 
     robot: str
@@ -100,9 +100,9 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error, in eps * reach.
+        """Estimated rounding error of a pose, as a multiple of eps * reach.
 
-        The estimate is not a proven bound, and excludes Pinocchio's rounding errors.
+        The estimate is not a proven bound, and does not include Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS
@@ -111,7 +111,7 @@ class TreeParameters:
         """Return the path lengths from the root to the links at `q`.
 
         Returns:
-            (..., joints) lengths (m), the larger of the URDF's and the table's.
+            (..., joints) lengths (m). Each entry is the larger of the URDF's length and the table's length.
         """
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
@@ -140,12 +140,10 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the poses of all links.
-
-        `q` is in the order of `coordinates`.
+        """Return the poses of all links for a configuration in the order of `coordinates`.
 
         Returns:
-            (..., joints, 4, 4) URDF frames in the root frame.
+            (..., joints, 4, 4) poses of the URDF link frames in the root frame.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
@@ -175,7 +173,7 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
             raise InputError(
                 f"a {joint.kind.value} joint has several axes, but a row of the table has one axis",
                 where=f"joint {joint.name}",
-                remedy="load the robot without root_joint, or derive tables of paths without this joint",
+                remedy="load the robot without root_joint, or make a table of a path without this joint",
             )
     lengths = _path_lengths(tree)
     links = _find_link_axes(tree, lengths)
@@ -200,7 +198,7 @@ class _LinkAxis:
     Attributes:
         T_antecedent_axis: Pose in the antecedent's axis frame.
         T_link_axis: Pose in the link's URDF frame.
-        zeroed_tilt: Sum of the tilts set to zero on the path from the root, rad.
+        zeroed_tilt: Sum (rad) of the zeroed tilts along the path from the root.
     """
 
     antecedent: int
@@ -211,11 +209,10 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return each link's axis frame; for a fixed joint, the link's URDF frame."""
+    """Return the axis frame of each link. If the link's joint is fixed, this is the link's URDF frame."""
     links = list[_LinkAxis]()
-    # The list has an entry for each link: (i, T_i_link, number of fixed joints from link i to the link).
-    # A moving link has its own index i.
-    # For all other links, i is the index of the antecedent.
+    # Each link has an entry: an index i, the pose T_i_link, and the number of fixed joints from link i to the
+    # link. For a moving link, i is the link's own index. For all other links, i is the antecedent's index.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -232,10 +229,12 @@ def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis
 def _find_transforms(
     tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
-    """Rz(phi) Tz(delta) moves a link's axis frame to the row's frame.
+    """Return the transforms between consecutive axes, and the offsets of the row frames.
+
+    A row's frame has the pose Rz(phi) Tz(delta) in the link's axis frame.
 
     Returns:
-        Transforms, and (phi, delta) by link.
+        The transforms, and (phi, delta) by link.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
@@ -250,7 +249,7 @@ def _find_transforms(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
-    # For a link without a moving child, x is chosen so that theta is 0.
+    # If no moving link follows a link, the direction of x is free. This choice of x makes theta 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)
@@ -321,7 +320,7 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule.
+    # The constant in a mimic joint's cell is the sum of the row's constant and the mimic rule's offset.
     variable = (
         f"q({row.mimicked_joint})"
         if row.mimicked_joint == row.joint

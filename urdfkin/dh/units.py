@@ -1,10 +1,10 @@
 r"""Convert a table's numbers from text and to text, with fractions of pi, degrees or millimetres.
 
-A table object is always in metres and radians. Other units are used only when a table is read or written.
+A table object stores metres and radians. Other units are used only when a table is read or written.
 
 The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. A
 term of the sum is a number, a multiple of pi, or a multiple of a joint variable. A number or a multiple of pi
-can have a unit. A cell may contain one variable, once.
+can have a unit. A cell may contain at most one term with a variable.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LengthUnit(StrEnum):
 
 
 #: A row that is a list has its cells in this order.
-#: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
+#: Craig's book uses the order alpha, a, d, theta. The Robotics Toolbox uses theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
 _MAX_CELL_LENGTH = 200
@@ -111,17 +111,13 @@ def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an angle as a fraction of pi.
-
-    Returns:
-        None if the angle is not exactly a multiple of pi/12.
-    """
+    """Return an angle as a fraction of pi, or None if it is not exactly a multiple of pi/12."""
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 
 
 def format_pi_fraction(fraction: Fraction, pi: str = "pi") -> str:
-    """Format a multiple of pi: 0, pi, -pi/2, 5pi/12."""
+    """Format a multiple of pi, for example as pi, -pi/2 or 5pi/12."""
     if fraction == 0:
         return "0"
     count = {1: "", -1: "-"}.get(fraction.numerator, str(fraction.numerator))
@@ -202,14 +198,15 @@ class InvalidCellError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The content of a cell, for example -q2 + 90 deg.
+    """The parsed text of a cell, for example of "-q2 + 90 deg".
 
     Attributes:
         number: The constant, in `unit`.
-        unit: "rad" (also with pi), "deg", "m" or "mm"; None: the table's unit.
-        variable_factor: Factor of the variable; None without variable.
-        variable: Number in the variable's name, 2 for q2.
-        text: Text of the constant, such as "90", if the constant is a single number; otherwise "".
+        unit: "rad" (also with pi), "deg", "m" or "mm". None means the table's unit.
+        variable_factor: Factor of the variable, or None if the cell has no variable.
+        variable: Number in the variable's name, for example 2 for q2.
+        text: Text of a constant that is a single number, such as "90". For other constants, the text is
+            empty.
     """
 
     number: float
@@ -272,7 +269,7 @@ class _Term:
     """A term of a cell's sum.
 
     Attributes:
-        operator: The last token if "*" or "/", otherwise "".
+        operator: "*" or "/" at the end of the term so far, or an empty string.
     """
 
     sign: float = 1.0

@@ -1,7 +1,7 @@
 """Exceptions of urdfkin.
 
-A message states the problem, the place, the wrong value and the remedy. Each part is also an attribute of the
-exception.
+A message states the problem, the place, the wrong value and the remedy. The exception has an attribute for
+each part of the message.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Number of leading characters of a name that `find_similar_names` compares.
+#: `find_similar_names` compares at most this number of characters at the start of a name.
 _COMPARED_PREFIX_LENGTH = 128
 MAX_CHARACTER_PAIRS = 1_000_000
 _MAX_SUGGESTIONS = 3
@@ -27,8 +27,8 @@ def find_similar_names(
 ) -> list[str]:
     """Return up to three known names that are similar to `word`, the most similar first.
 
-    The comparison ignores case and reads only the first 128 characters of a name. `cutoff` is the least
-    similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends before it compares more than
+    The comparison ignores case and reads only the first 128 characters of a name. A returned name has at
+    least the similarity `cutoff`, from 0 to 1, as in `difflib.get_close_matches`. The search compares at most
     `work` pairs of characters.
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
@@ -52,7 +52,7 @@ def find_similar_names(
 
 
 class QuestionsSection(Enum):
-    """A section of docs/questions.md; `str` returns the command that prints the section.
+    """A section of docs/questions.md. `str` returns the command that prints the section.
 
     >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
@@ -107,11 +107,11 @@ class UrdfkinError(Exception):
     """Base class of all exceptions that urdfkin raises intentionally.
 
     Attributes:
-        what: The problem in one clause, without a full stop.
-        where: Place of the problem: a line of a file, a frame, or a sample; None: unknown.
+        what: The problem without a full stop, such as "a length is negative".
+        where: Place of the problem: a line of a file, a frame or a sample. None means unknown.
         found: The wrong value, or a description of it, such as "shape (1,)".
         remedy: Instruction for the user.
-        question: Section of docs/questions.md; the message ends with the command that prints the section.
+        question: Section of docs/questions.md. The message ends with the command that prints the section.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
 
     >>> error = UrdfkinError("a length is negative", where="arm.urdf:3", found="-1", remedy="remove the sign")
@@ -159,7 +159,7 @@ def _unpickle_error(cls: type[_E], state: dict[str, Any]) -> _E:
 
 
 class InputError(UrdfkinError, ValueError):
-    """An argument is invalid: for example a wrong length, an infinite value, or a non-orthogonal rotation.
+    """An argument is invalid, for example a wrong length, an infinite value or a non-orthogonal rotation.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -176,13 +176,13 @@ class NotFiniteError(InputError):
 
 
 class RangeError(InputError):
-    """The numbers are so large that a result exceeds the range of double precision."""
+    """A result is too large for double precision."""
 
 
 class UnknownNameError(UrdfkinError, LookupError):
     """A name does not exist.
 
-    The message suggests similar existing names. If no name is similar, it lists up to six existing names.
+    The message suggests similar existing names. If no name is similar, the message lists up to six names.
 
     Attributes:
         name: The unknown name.
@@ -241,22 +241,22 @@ class SourceError(UrdfkinError, OSError):
 
 
 class RepresentationSingularityError(InputError):
-    """Euler angles are at their representational singularity (7.56), or too near to it.
+    """Euler angles are too near to their representational singularity (7.56).
 
     At the singularity, some angular velocities correspond to no derivatives of the angles.
 
     Attributes:
         sequence: The sequence of the Euler angles, as in the message.
         distance: Distance (rad) of the middle angle from its value at the singularity.
-        sample: Index of the worst sample of a batch; () for a single sample.
+        sample: Index of the worst sample of a batch, or () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
         super().__init__(
-            f"the Euler angles {sequence} are at their representational singularity, or too near to it: "
-            "at the singularity, some angular velocities correspond to no angle rates",
+            f"the Euler angles {sequence} are too near to their representational singularity, where some "
+            "angular velocities correspond to no angle rates",
             where=f"sample {list(sample)}" if sample else None,
-            found=f"a middle angle {distance:.3g} rad from it",
+            found=f"a middle angle {distance:.3g} rad from the singularity",
             remedy="describe the orientation by another sequence or by a quaternion",
         )
         self.sequence = sequence

@@ -27,11 +27,11 @@ NOISE_FRACTION = 1e-15
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of text and numbers; numbers are displayed with six digits.
+    """A table of text and numbers. Numbers are displayed with six digits.
 
     Attributes:
-        left: The left-aligned columns: the number of columns from the left, or a collection of column
-            indices. The cells of left-aligned columns keep leading blanks.
+        left: Left-aligned columns, as a number of columns from the left or as column indices. The cells of
+            left-aligned columns keep leading blanks.
         names: Indices of columns that Markdown displays as code.
     """
 
@@ -51,7 +51,7 @@ class Table:
         ]
 
     def _split_tree_lines(self) -> list[list[tuple[str, str]]]:
-        """Split each heading and cell into two texts: leading characters such as `├ `, and the rest."""
+        """Split each heading and cell into its leading characters such as `├ ` and the following text."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(TREE_LINES),)]
             for row in (self.heads, *self.cells())
@@ -142,7 +142,7 @@ class Matrix:
 
 
 class Strong(str):
-    """A sentence with emphasis; `style` is a style for terminals, such as "bold red"."""
+    """A sentence with emphasis. `style` is a style for terminals, such as "bold red"."""
 
     __slots__ = ("style",)
     style: str
@@ -236,7 +236,7 @@ def format_count(n: int, noun: str) -> str:
 
 
 def format_number(value: float, noise: float = NOISE_FRACTION, digits: int = 6) -> str:
-    """Format a number with `digits` significant digits; absolute values up to `noise` become "0".
+    """Format a number with `digits` significant digits. Absolute values up to `noise` become "0".
 
     >>> format_number(0.1 + 0.2), format_number(1e-16), format_number(1e-16, noise=0.0)
     ('0.3', '0', '1e-16')

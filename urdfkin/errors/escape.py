@@ -1,7 +1,7 @@
-"""Escaping of names from files: one function for each output format.
+"""Escape names from files, with one function for each output format.
 
 A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
-spreadsheet formulas. Each function replaces such characters by readable escapes.
+spreadsheet formulas. Each function escapes these parts of a name for one format.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FORMULA_STARTS = ("=", "+", "-", "@")
 #: Group 1 is the character to escape.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 #: Patterns of commands in logs, for example `::error::`, of GitHub, Azure and TeamCity.
-#: GitHub's commands are at the beginning of a line.
+#: GitHub executes a command only at the beginning of a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
 #: Invisible character (word joiner).
@@ -89,8 +89,8 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def json_text(data: Any) -> str:
     r"""Return data as JSON text in ASCII.
 
-    A CI service can interpret text such as `##[error]` as a command. Therefore, the second `#` of each `##`
-    is escaped. A JSON parser restores the original text.
+    A CI service can interpret text such as `##[error]` as a command. To prevent this, the function escapes
+    the second `#` of each `##`. A JSON parser restores the original text.
 
     >>> print(json_text(["\u202e ##[error]"]))
     ["\u202e #\u0023[error]"]
@@ -102,7 +102,7 @@ def json_text(data: Any) -> str:
 def escape_sequence(c: str) -> str:
     """Return the escape sequence of a character in Python and TOML.
 
-    For characters up to U+FFFF, JSON has the same escape sequence.
+    JSON uses the same sequence for characters up to U+FFFF.
     """
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
@@ -110,7 +110,7 @@ def escape_sequence(c: str) -> str:
 def csv_cell(name: str) -> str:
     r"""Escape a name for a CSV cell: one line that no spreadsheet interprets as a formula.
 
-    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text; `from_csv_cell` removes the apostrophe.
+    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text. `from_csv_cell` removes the apostrophe.
 
     >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
     ("'=cmd|'/C calc'!A0", 'joint1')
@@ -120,7 +120,7 @@ def csv_cell(name: str) -> str:
 
 
 def csv_number_or_text(text: str) -> str:
-    """Escape text for a CSV cell as `csv_cell` does; return a number unchanged.
+    """Escape text for a CSV cell as `csv_cell` does, but return a number unchanged.
 
     >>> csv_number_or_text("-0.5"), csv_number_or_text("-y")
     ('-0.5', "'-y")
@@ -129,5 +129,5 @@ def csv_number_or_text(text: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """Return the name from a cell that `csv_cell` wrote; escaped characters stay escaped."""
+    """Return the name from a cell that `csv_cell` wrote. Escaped characters stay escaped."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA_STARTS) else cell

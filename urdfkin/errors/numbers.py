@@ -32,7 +32,7 @@ _REMEDIES = (
 
 
 def parse_float(text: str) -> float | None:
-    """Parse a finite number, with optional surrounding blanks; return None for all other text.
+    """Parse a finite number with optional surrounding blanks, or return None for other text.
 
     >>> [parse_float(text) for text in (" -1.5e-3", "1_0", "nan", "\u0661", "1e999")]
     [-0.0015, None, None, None, None]
@@ -45,7 +45,7 @@ def parse_float(text: str) -> float | None:
 
 
 def parse_int(text: str) -> int | None:
-    """Parse an integer, with optional surrounding blanks; return None for all other text.
+    """Parse an integer with optional surrounding blanks, or return None for other text.
 
     >>> parse_int("12"), parse_int("1_2"), parse_int("1.0"), parse_int("1e3")
     (12, None, None, None)
@@ -60,7 +60,7 @@ def number_remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Short name of a unit, for each accepted name of the unit.
+#: Short name of the unit for each accepted name.
 UNIT_SHORT_NAMES = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
@@ -77,10 +77,10 @@ _MAX_QUANTITY_LENGTH = 200
 
 
 class ParsedNumber(NamedTuple):
-    """A parsed number; a number with a unit is converted to radians or metres.
+    """A parsed number. If the text has a unit, the number is converted to radians or metres.
 
     Attributes:
-        unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
+        unit: "rad", "m", or None for a number without a unit. A multiple of pi without a unit is in radians.
         seconds_exponent: Exponent of the seconds in the denominator of the unit: 1 for rad/s, 2 for rad/s^2.
     """
 
@@ -90,7 +90,7 @@ class ParsedNumber(NamedTuple):
 
 
 def parse_quantity(text: str) -> ParsedNumber | None:
-    """Parse a finite number with an optional unit; return None for any other text, such as a sum.
+    """Parse a finite number with an optional unit, or return None for other text, such as a sum.
 
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)

@@ -1,4 +1,4 @@
-"""Validators of arguments; a validator returns the value in the proper type, or raises InputError."""
+"""Validators of arguments. A validator returns the value in the proper type, or raises InputError."""
 
 from __future__ import annotations
 
@@ -65,7 +65,10 @@ def as_choice(value: str | None, default: str, name: str) -> str:
 
 
 def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return a list of names as a tuple; the caller must check that each name exists."""
+    """Return a list of names as a tuple.
+
+    The caller must check that each name exists.
+    """
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"

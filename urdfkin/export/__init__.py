@@ -33,15 +33,15 @@ DEFAULT_QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_for_language(code: FrameCode, to: str) -> FrameCode:
-    """Return exact code for sympy-exact, otherwise `code`."""
+    """Return `code`, or the code with exact constants if `to` is sympy-exact."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """Return an exported file's text with its digest.
 
-    `file`, for example `arm.c`, replaces the default file name in the text. The default name remains if
-    `file` contains other characters than ASCII letters, digits, "_", "." and "-".
+    `file`, for example `arm.c`, replaces the default file name in the text. The text keeps the default name
+    if `file` contains a character that is not an ASCII letter, a digit, "_", "." or "-".
 
     Raises:
         UnknownNameError: `to` is not a key of `LANGUAGES`.

@@ -29,7 +29,7 @@ _PLACEHOLDER = re.compile(r"@(\w+)@")
 def write(code: FrameCode, to: str = "c") -> str:
     """Return a C file.
 
-    If the macro `NAME_DECLARATIONS` is defined, only declarations are compiled.
+    If the macro `NAME_DECLARATIONS` is defined, the compiler reads only the declarations.
     """
     return c_file(
         code,
@@ -94,7 +94,7 @@ def parameter_list(function: Function, real: str) -> str:
 
 
 def _declarations(code: FrameCode) -> Iterator[str]:
-    yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
+    yield "/* A function writes its result to `out`, row by row. A batch has n consecutive configurations. */"
     for function in code.functions:
         declared = parameter_list(function, f"{code.name.upper()}_REAL")
         yield f"/* {describe_result(function)} */"
@@ -146,7 +146,7 @@ def _function(code: FrameCode, function: Function) -> str:
 def min_configuration_count(code: FrameCode, function: Function) -> int:
     """Return the least number of configurations for which every array has at least eight numbers.
 
-    Arrays without numbers do not count.
+    Empty arrays are ignored.
     """
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
@@ -159,7 +159,8 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 class InputLayout:
     """Layout of the C array `in`.
 
-    Order: other inputs, input angles, computed angles, sines of all angles, cosines of all angles.
+    The order is: inputs that are not angles, input angles, computed angles, sines of all angles, cosines of
+    all angles.
     """
 
     def __init__(self, function: Function) -> None:

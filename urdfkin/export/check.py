@@ -26,7 +26,7 @@ from urdfkin.system.processes import python_command
 #: Text in the first lines of every exported file.
 EXPORT_MARK = "straight-line code for this robot and frame"
 _DIGEST_PLACEHOLDER = "0" * 64
-#: In this line, `insert_seal` replaces the zeros by the digest.
+#: Line of the header. `insert_seal` replaces the zeros by the digest.
 SEAL = f"Seal sha256 {_DIGEST_PLACEHOLDER}"
 _SEAL_LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 _MAIN_MACRO = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
@@ -43,9 +43,10 @@ _COMPILE_COMMANDS = {
 }
 #: Compiler and options for CUDA if the computer has nvcc and a GPU.
 _GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
+#: The check looks for `EXPORT_MARK` and the word UNVERIFIED in this number of characters at the start of a
+#: file.
 _HEADER_LENGTH = 2000
-#: Time limit of a compiler or a test program, s.
+#: Time limit (s) of a compiler or a test program.
 #: The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
@@ -56,7 +57,7 @@ def insert_seal(text: str) -> str:
 
 
 def _has_valid_seal(text: str) -> bool | None:
-    """Return whether the digest is correct; None without a digest."""
+    """Return whether the digest is correct, or None if the text has no digest."""
     text = text.replace("\r\n", "\n")
     if (found := _SEAL_LINE.search(text)) is None:
         return None
@@ -72,8 +73,8 @@ class FileCheck:
     """Result of a check.
 
     Attributes:
-        lines: One line for each function and precision; a line begins with "good" or "WRONG".
-        passed: Whether each line begins with "good".
+        lines: One line for each function and precision. Each line begins with "good" or "WRONG".
+        passed: True if each line begins with "good".
         warnings: Reasons why the file is not verified.
     """
 
@@ -90,7 +91,7 @@ def check(file: Path) -> FileCheck:
     """Run an exported file's test vectors.
 
     Raises:
-        InputError: urdfkin did not write the file, cannot run a file of this kind, or the file does not run.
+        InputError: `urdfkin export` did not write the file, or the file cannot be run.
     """
     text = read_text(file)
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:

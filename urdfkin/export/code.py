@@ -30,12 +30,14 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame.
 
-    The names of the robot, the frame, the coordinates and the joints are escaped: no name can end a comment.
+    The names of the robot, the frame, the coordinates and the joints are escaped, so no name can end a
+    comment.
 
     Attributes:
-        identifiers: Names in the code, by letter: "q": coordinates; "v", "a": velocities; "s": joints.
-        maybe_proof: None for code that is not exported.
-        exact: Returns code with exact constants.
+        identifiers: Lists of names in the code. The keys are "q" (coordinates), "v" and "a" (velocities), and
+            "s" (joints).
+        maybe_proof: The proof, or None for code that is not exported.
+        exact: Function that returns the code with exact constants.
     """
 
     name: str
@@ -54,7 +56,7 @@ class FrameCode:
     @property
     def proof(self) -> Proof:
         if self.maybe_proof is None:
-            raise ValueError("code that was not verified is not exported")
+            raise ValueError("the code has no proof, so it cannot be exported")
         return self.maybe_proof
 
     @property
@@ -183,7 +185,7 @@ def _parse_quantities(names: Collection[str]) -> list[Quantity]:
 class Writer:
     """Writes expressions as code.
 
-    If `sine` is False, sines and cosines are inputs.
+    If `sine` is False, the code reads sines and cosines from its inputs and does not compute them.
     """
 
     def __init__(

@@ -4,8 +4,8 @@ The first call of a quantity compiles exported C code with the system's compiler
 with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key consists of the C code, the compiler, its options and
-the processor. On Linux, the code is loaded from memory, because another program could change a file after the
-test of the checksum. Other systems load the code from a temporary file.
+the processor. On Linux, urdfkin loads the code from memory. Therefore, no other program can change the code
+after the test of the checksum. On other systems, urdfkin loads the code from a temporary file.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class NoCompilerError(Exception):
 def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile one function, and load the library.
 
-    The library's function `task` takes an array with the fields of `KernelArgs`. `task` returns 1 if an
-    input is not finite, else 0.
+    The library contains a function `task`. Its argument is an array with the fields of `KernelArgs`. The
+    function returns 1 if an input is not finite, else 0.
 
     Raises:
         NoCompilerError: no C compiler is installed, or the compiler rejects the code.
@@ -144,8 +144,8 @@ def _load_code(data: bytes) -> ctypes.CDLL:
         file.write(data)
         file.flush()
         # The loader identifies a library by the library's path, which contains the file descriptor.
-        # After the file is closed, a library that is loaded later can have the same file descriptor.
-        # A different number of "./" for each library makes all paths different.
+        # After this file is closed, the next library can have the same file descriptor.
+        # Therefore, each path contains a different number of "./".
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
@@ -167,8 +167,8 @@ def _processor_features() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results.
-#: The results of eight configurations then need at most half a megabyte of stack.
+#: Maximum number of results of one configuration.
+#: With this limit, eight configurations need at most half a megabyte of stack.
 _MAX_RESULTS = 8192
 # Plain integers are faster than members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
@@ -203,11 +203,11 @@ class _ExportedRobot(Protocol):
 class CompiledFrame:
     """Compiled functions for one robot frame: the result of `Robot.compile`.
 
-    Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
-    exactly the same result in a batch and in a single call. A wrong shape or a number that is not finite is
-    an error. The machine code is compared with Pinocchio once, on more than a hundred configurations. After
-    `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of
-    a `CompiledFrame` as unchecked.
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
+    has exactly the same result in a batch and in a single call. A wrong shape and a number that is not finite
+    raise InputError. The machine code is compared with Pinocchio once, on more than a hundred configurations.
+    After `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of a
+    `CompiledFrame` as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -242,7 +242,7 @@ class CompiledFrame:
     ) -> FloatArray:
         """Return T_world_frame (..., 4, 4): eq. 7.77.
 
-        Arguments and errors are those of `Robot.placement`.
+        Arguments and errors are the same as for `Robot.placement`.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").compile("tip")
@@ -396,8 +396,8 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # If a number is not finite, the code below checks the inputs again.
-            # The error message then names the coordinate of this number.
+            # After a NotFiniteError, the code below checks the inputs again.
+            # That error message names the coordinate that is not finite.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
@@ -414,7 +414,7 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether the machine code can use all arguments without conversion.
 
-        For a large batch, the conversion in `Call` takes 10 % of the time.
+        In a large batch, the conversion of the arguments takes 10 % of the time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.may_overflow) and _is_plain(
@@ -442,9 +442,8 @@ class CompiledFrame:
         def compute_block(block_inputs: Sequence[FloatArray], block_out: FloatArray) -> int:
             arguments = _ArgumentArray()
             arguments[_N], arguments[_OUT] = len(block_out), address(block_out)
-            # The code writes eight numbers at once.
-            # Therefore, the code may write up to seven numbers beyond the results.
-            # The buffer `stage` has space for these additional numbers.
+            # The code writes eight numbers at once, and up to seven numbers after the last result.
+            # The buffer `stage` has space for these seven numbers.
             stage = (
                 aligned_empty(LANES * block_out[0].size + LANES)
                 if row.has_columns and uses_buffer(out)

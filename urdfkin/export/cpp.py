@@ -74,7 +74,7 @@ def _cuda(code: FrameCode) -> str:
         f"               from C: {name}_{first.name}_double(n, {inputs}, out, stream) of the library, with",
         f'               #define {up}_DECLARATIONS, then #include "{name}.cuh"',
         "Options:       Do not use -use_fast_math: its errors are larger than the error bounds in float.",
-        "               This file cannot detect the option, because nvcc defines no macro for it.",
+        "               The file cannot detect this option, because nvcc defines no macro for it.",
         "CMake:         enable_language(CUDA)",
         f"               configure_file({name}.cuh {name}.cu COPYONLY)",
         f"               add_library({name} ${{CMAKE_CURRENT_BINARY_DIR}}/{name}.cu)",

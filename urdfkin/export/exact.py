@@ -78,7 +78,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def exact_angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Replace an angle that is a multiple of pi/12 in double precision, except 0, by a `PiMultiple`."""
+        """Replace a nonzero multiple of pi/12 in double precision by a `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_PI_MULTIPLE_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
@@ -124,7 +124,8 @@ def make_exact_plan(
 def _rotation_with_z_axis(axis: Vector, z: float) -> Matrix:
     """Return a rotation matrix with third column `axis`.
 
-    See `rotation_with_z_axis`. `axis` is a unit vector. `z` is the third component of `axis`, as a float.
+    See `rotation_with_z_axis`. `axis` is a unit vector of exact numbers. `z` is the third component of `axis`
+    as a float.
     """
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
@@ -203,7 +204,7 @@ def make_exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Make and check exact functions.
 
-    The test vectors are those of `proof`.
+    The test vectors are taken from `proof`.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(REFERENCE_DIGITS):
@@ -229,7 +230,7 @@ def make_exact_functions(
 
 
 def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Evaluate with more than `REFERENCE_DIGITS` digits, then round to doubles (n, ...)."""
+    """Evaluate with more than `REFERENCE_DIGITS` digits, and return the results (n, ...) as doubles."""
     with precision(REFERENCE_DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
             list(map(float, evaluate_intervals(function, one)))

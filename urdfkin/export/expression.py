@@ -1,7 +1,7 @@
 """Symbolic numbers: arithmetic with these numbers creates a graph of expressions for exported code.
 
-The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each new expression:
+The equations of `urdfkin.kinematics.equations` accept symbolic numbers instead of floats. The graph
+simplifies each new expression:
 
 | Expression | Simplified expression |
 |---|---|
@@ -29,7 +29,7 @@ from typing import Any
 
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: A number in an equation: a float, or a node of the graph.
+#: A number in an equation is a float or a node of the graph.
 Number = Any
 _EQUATION_NUMBERS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
@@ -39,10 +39,10 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        operands: Nodes and constants, or an input's index.
-        index: Number in the order of creation; operands have smaller numbers.
-        step: Index of the recursion's step: first the joints, then the frame, then the results.
-            The step of exact constants is -1.
+        operands: Operands of the operation, as nodes or constants. An input has one operand, its index.
+        index: Number in the order of creation. Operands have smaller numbers than the operation.
+        step: Index of the recursion's step. The steps are the joints, the frame and the results, in this
+            order. Exact constants have the step -1.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
@@ -86,7 +86,7 @@ class Node:
 class Graph:
     """The expressions of one function."""
 
-    #: Products with 0 and differences x - x become this constant.
+    #: Constant that replaces products with 0 and differences x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class Graph:
         return self.make_node(letter, index)
 
     def make_node(self, op: str, *operands: Any) -> Node:
-        """Return the node of an operation; equal operations share a node."""
+        """Return the node of an operation. Equal operations share a node."""
         key = (op, *operands)
         if (node := self._nodes.get(key)) is None:
             node = self._nodes[key] = Node(self, op, operands, len(self._nodes))
@@ -172,7 +172,7 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return y if x is the expression -y or the negative constant -y, else None."""
+    """Return y if x is an expression -y or a negative constant -y; otherwise, return None."""
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None
@@ -187,7 +187,7 @@ def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
 def find_dependencies(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
     """Return all nodes that the results depend on.
 
-    Operations in `leaves` count as inputs.
+    Operations in `leaves` are treated as inputs.
     """
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:

@@ -63,7 +63,7 @@ def make_chain_code(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        # Warnings about a generated URDF do not help the user.
+        # The user did not write the generated URDF, so warnings about it do not help.
         warnings.simplefilter("ignore", UrdfWarning)
         robot = get_hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame

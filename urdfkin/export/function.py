@@ -9,13 +9,12 @@ Each function computes one quantity of one frame. These expressions are assigned
 
 All other expressions are parts of larger expressions.
 
-**Single precision.** `single_bounds` bounds the rounding errors to first order in eps:
+**Single precision.** `single_bounds` bounds the rounding errors to first order in eps. An operation or
+constant of the code has the value x_i with the rounding error e_i (`urdfkin.kinematics.roundings`). A result
+y has this error and this bound:
 
-    x_i: value of an operation or constant of the code
-    e_i: rounding error of x_i (`urdfkin.kinematics.roundings`)
-    y: a result
-    error of y = sum of e_i dy/dx_i
-    bound of y = sum of |e_i dy/dx_i|
+    `error = sum of e_i dy/dx_i`
+    `bound = sum of |e_i dy/dx_i|`
 
 A backward pass over the operations computes the derivatives.
 """
@@ -46,11 +45,11 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
 INPUT_LETTERS = ("q", "v", "a")
-#: Operations whose result is always assigned to a variable.
+#: The results of these operations are always assigned to variables.
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
-#: Maximum number of operations in a statement.
+#: Maximum number of operations in a statement of exported code.
 _MAX_STATEMENT_OPERATIONS = 12
-#: Maximum number of results whose derivatives are computed together, to limit memory.
+#: To limit memory, the derivatives of at most this number of results are computed together.
 _RESULTS_PER_PASS = 512
 
 
@@ -224,8 +223,8 @@ def _name_nodes(step: int, state: LinkState) -> None:
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Bound the errors (n, results) in single precision.
 
-    The unit is eps = 2^-23. The inputs must be single-precision numbers. Errors of the constants in double
-    precision are excluded. Beyond the range of single precision, the bound is inf.
+    The unit is eps = 2^-23. The inputs must be single-precision numbers. The bound does not include the
+    errors of the double-precision constants. The bound is inf if single precision overflows.
     """
     value = function.node_values(inputs)
     bounds = np.zeros((len(inputs[0]), len(function.results)))
@@ -241,9 +240,9 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives with respect to x.
+        """Add `slope` to the derivatives of the results with respect to x.
 
-        If x is a constant, add |slope| * (error of x) to the bounds instead.
+        If x is a constant, add the absolute value of `slope` times the error of x to the bounds.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
@@ -267,7 +266,7 @@ def _bounds_of_results(
 
 
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
-    """Return the rounding errors (n,) of one operation, in eps = 2^-23."""
+    """Return the rounding errors (n,) of the node's operation with the results x, in eps = 2^-23."""
     size = np.abs(x)
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
@@ -285,6 +284,6 @@ def _constant_error(x: float) -> float:
 
 
 def _add_range_error(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add the error of possible underflow; overflow gives inf."""
+    """Add the error of a possible underflow. The error is inf if `size` overflows in single precision."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

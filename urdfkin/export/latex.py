@@ -1,7 +1,7 @@
 r"""Write a LaTeX document with the formulas of the straight-line code, in the textbook's symbols.
 
-The number in a symbol such as s_2 or R^(2) is the number of a joint on the path. After n joints, n + 1 is the
-number of the frame. A list at the beginning of the document contains the joints' names.
+In symbols such as s_2 and R^(2), the number 2 means the second joint on the path. On a path with n joints,
+the number n + 1 means the frame. A list at the beginning of the document contains the joints' names.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _RESULT_SYMBOLS = {
 
 
 def write(code: FrameCode, to: str = "latex") -> str:
-    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # A LaTeX document has none.
+    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # A LaTeX document has no test vectors.
     joints, coordinates, rates = (
         enumerate(map(latex_text, names), 1) for names in (code.joints, code.coordinates, code.rates)
     )

@@ -1,7 +1,7 @@
 """Convert names in a URDF to identifiers and comments for exported code in every language.
 
 Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
-identifier is a keyword.
+identifier is a keyword of a programming language.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import sanitize
 
-#: Maximum length of a name before a prefix and a number are added; MATLAB allows 63 characters in all.
+#: Maximum length of a name without prefix and number. MATLAB allows 63 characters in all.
 _MAX_LENGTH = 40
 #: Maximum length of a prefix; the exported code appends at most 11 characters to it: `_kinematics`.
 _MAX_PREFIX_LENGTH = 52
@@ -72,7 +72,7 @@ def comment_name(name: str) -> str:
 def comment_text(text: str) -> str:
     """Replace characters that could end a comment.
 
-    Question marks are replaced too, because of C's trigraphs, such as ??/.
+    Question marks are also replaced, because they begin C's trigraphs, such as ??/.
 
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'

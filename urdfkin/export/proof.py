@@ -56,9 +56,9 @@ class ExportVector:
     """One configuration with its true results.
 
     Attributes:
-        tolerances: Bounds in double precision, in eps.
-        single_tolerances: Bounds in single precision, in eps. Beyond the range of single precision, the value
-            is 0.0.
+        tolerances: Bounds in double precision, in eps = 2^-52.
+        single_tolerances: Bounds in single precision, in eps = 2^-23. The bound is 0.0 if single precision
+            overflows.
     """
 
     inputs: tuple[list[float], ...]
@@ -73,7 +73,7 @@ class Proof:
 
     Attributes:
         single_precision_bounds: Largest bound of each quantity, in eps * scale. The scale is an upper bound
-            on the sum of |term| over a number's terms. Beyond the range of single precision, a bound is inf.
+            on the sum of |term| over a number's terms. The bound is inf if single precision overflows.
         lock: Names and values of locked joints.
     """
 
@@ -166,7 +166,7 @@ def compare_with_pinocchio(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    # `Robot.certificate` must not count these checks, so a copy of the verifier makes them.
+    # Use a copy of the verifier, because `Robot.certificate` must not count the checks of exported code.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
     for function in functions:
@@ -222,7 +222,7 @@ def _make_vectors(
 def _tolerances_and_scales(
     function: Function, part: CallPart, errors: DecimalErrors
 ) -> tuple[FloatArray, FloatArray]:
-    """Return error bounds (n, numbers), in eps, and their scales (n, numbers)."""
+    """Return the error bounds in eps, and the scales, both (n, numbers)."""
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
@@ -233,9 +233,9 @@ def _tolerances_and_scales(
 
 
 def format_decimal(x: Number) -> str:
-    """Return an interval's midpoint as decimal text, at most `REFERENCE_DIGITS` digits.
+    """Return an interval's midpoint as decimal text with at most `REFERENCE_DIGITS` digits.
 
-    If the interval contains 0, the text is "0.0".
+    Return "0.0" for an interval that contains 0.
     """
     ball = as_interval(x)
     if ball.contains(0):
@@ -259,6 +259,6 @@ def _round_up(x: float) -> str:
 
 def _round(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
-        return "0.0"  # A bound of 0 accepts only equal numbers.
+        return "0.0"  # With a bound of 0, the self-test accepts only equal numbers.
     with localcontext(prec=digits, rounding=rounding):
         return f"{float(+Decimal(x)):.{digits}g}"

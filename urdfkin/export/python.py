@@ -26,11 +26,11 @@ class Dialect:
     """The code for one Python library.
 
     Attributes:
-        result: Yields the lines that return the results.
-        imports: Import lines. `{}` is replaced by the needed functions, such as `cos, sin`.
+        result: Generator of the code lines that return the results.
+        imports: Import lines. The names of the used functions replace `{}`, for example `cos, sin`.
         values_body: Body of the exported function `_values`.
             `_values` evaluates a function at several configurations.
-        input_format: Pattern of an input's number, such as `q[0]`.
+        input_format: Pattern of the code for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported `check`.
     """
 
@@ -54,7 +54,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that fills an array."""
+    """Return a `result` function, which makes code that fills an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -67,7 +67,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that returns a matrix.
+    """Return a `result` function, which makes code that returns a matrix.
 
     A Hessian becomes a matrix (6 nv, nv).
     """
@@ -115,7 +115,7 @@ def _input_check_lines(writer: Writer, namespace: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Make a `Dialect.first_lines` that checks the inputs' lengths."""
+    """Return a `first_lines` function, which makes code that checks the inputs' lengths."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -133,9 +133,9 @@ def _array_first_lines(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `Dialect.result` that stacks numbers.
+    """Return a `result` function, which makes code that stacks numbers.
 
-    Arrays may be immutable, for example in JAX.
+    The code does not fill an array, because some libraries have immutable arrays, for example JAX.
     """
 
     def result(writer: Writer) -> Iterator[str]:
@@ -188,10 +188,9 @@ def _make_input_check(
 ) -> str:
     """Return code of the function `_demand`.
 
-    `wrong_type` and `is_array` are Python expressions. `wrong_type` is true for numbers of a wrong type.
-    `is_array` tests whether the input `x` is an array. If `is_array` is empty, `_demand` does not test
-    whether `x` is an array.
-    `parameters` contains further parameters of `_demand`.
+    `wrong_type` and `is_array` are Python expressions about the input `x`. `wrong_type` is true if the
+    numbers in `x` have a wrong type. `is_array` is true if `x` is an array. If `is_array` is empty, `_demand`
+    does not test whether `x` is an array. `parameters` contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _INPUT_CHECK.format(
@@ -255,20 +254,18 @@ def _torch_module_code(code: FrameCode) -> str:
 
 
 def _rotation_rate_bound(plan: CompiledTree) -> float:
-    """Bound a vector's rotation due to a change of one coordinate.
+    """Bound the angle (rad) by which a vector rotates if one coordinate changes by 1 rad.
 
-        r >= angle (rad) by which a vector rotates if one coordinate changes by 1 rad
-        s: sum of |multiplier| over the revolute joints of one coordinate (mimic rules)
-        r = max(1, largest s)
-        with a floating joint: r = max(3, largest s)
+    For each coordinate, s is the sum of |multiplier| over the revolute joints that follow the coordinate
+    (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the bound is at
+    least 3.
 
-    Derivation of 3: if one component of a unit quaternion changes by t, the body rotates about a fixed axis.
+    Derivation of 3: If one component of a unit quaternion changes by t, the body rotates about a fixed axis.
+    In four dimensions, x is the angle between the quaternion and the component's coordinate axis. At t = 0,
+    the rotation angle has the first three derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third derivative
+    of a product of F rotated unit vectors is at most:
 
-        x: angle between the quaternion and the component's coordinate axis, in four dimensions
-        first three derivatives of the rotation angle at t = 0: 2 sin x, -2 sin 2x, 4 sin 3x
-        third derivative of a product of F rotated unit vectors
-            <= (2 F)^3 + 3 (2 F)(2 F) + 4 F
-            <= (3 F)^3
+        `(2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3`
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(sum_multipliers(plan)[0].max(initial=0.0)))
@@ -291,7 +288,7 @@ _EVALUATE_EACH = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
-        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}), whose batch axes broadcast.",
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}). Batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
         helpers=_make_input_check('x.dtype.kind not in "biuf"', numbers="real numbers"),
         first_lines=_numpy_first_lines,
@@ -334,9 +331,9 @@ DIALECTS = {
         values_body=_EVALUATE_EACH.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
-        "broadcast. The functions support jit, vmap and grad.\n"
-        "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision.\n"
+        "Batch axes broadcast. The functions support jit, vmap and grad.\n"
+        "For long chains, XLA's fusion pass takes minutes. The following code disables the fusion pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         helpers=_make_input_check("not jnp.issubdtype(x.dtype, jnp.floating)")
@@ -360,8 +357,8 @@ DIALECTS = {
         has_single_precision=True,
     ),
     "torch": Dialect(
-        about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device,\n"
-        "whose batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
+        about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device.\n"
+        "Batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
         "Kinematics() is a torch.nn.Module with these functions.",
         imports="import torch\nfrom torch import {}",
         helpers=_make_input_check(

@@ -9,8 +9,8 @@ motion about or along z.
 | velocity, acceleration for WORLD | world |
 | other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
 
-For LOCAL_WORLD_ALIGNED, all rotations along the path are then applied to velocity and acceleration one after
-another. These rotations need a third fewer operations than the computation of the rotation matrix R.
+For LOCAL_WORLD_ALIGNED, the velocity and the acceleration are then rotated joint by joint to the world axes.
+This needs a third fewer operations than the computation of the frame's rotation matrix.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class NumberKind:
 
     Attributes:
         chapter: The textbook's equations.
-        begin_step: Called with the step's index before each step.
-            The steps are the joints 0 to n - 1, the frame (n) and the results (n + 1).
-        end_step: Called with the step's index after the steps 0 to n.
+        begin_step: Callback before each step, with the step's index as its argument.
+            The steps are the joints (0 to n - 1), the frame (n) and the results (n + 1).
+        end_step: Callback after each joint and after the frame, with the step's index and the link's state.
     """
 
     chapter: Any
@@ -49,8 +49,8 @@ class TreeRecursion(Recursion):
     """The forward recursion along one path.
 
     Attributes:
-        inputs: Numbers q, v and a; zeros if unused.
-        own_axes: Whether vectors use each link's own axes.
+        inputs: The numbers of q, v and a. Unused inputs contain zeros.
+        own_axes: True if each link's vectors are expressed in the link's own axes.
         turns: Rotation matrices from each frame to the previous frame.
         end: State of the frame.
     """
@@ -129,10 +129,10 @@ class TreeRecursion(Recursion):
 
 
 def _drop_tiny_entries(x: Sequence[float]) -> Vector:
-    """Replace entries below the largest entry's rounding error by 0.
+    """Replace each entry that is smaller than the largest entry's rounding error by 0.
 
     Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
-    `urdfkin.kinematics.roundings` include this replacement.
+    `urdfkin.kinematics.roundings` account for the omitted entries.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]
@@ -177,10 +177,8 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the Hessian (6, nv, nv) row by row.
 
-    The Hessian contains a matrix H_i (6, nv) for each joint motion i:
-
-        H_i: derivative of the Jacobian with respect to joint motion i
-        time derivative of the Jacobian = sum of H_i v_i (7.126)
+    For each joint motion i, the Hessian contains the derivative H_i (6, nv) of the Jacobian with respect to
+    the motion. The time derivative of the Jacobian is the sum of H_i v_i (7.126).
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
@@ -201,7 +199,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
         case Reference.LOCAL | Reference.WORLD:
-            pass  # The components of both vectors already refer to the axes of the reference frame.
+            pass  # `linear` and `angular` are already expressed in the axes of the reference frame.
         case _:
             assert_never(reference)
     return [*linear, *angular]

@@ -1,6 +1,6 @@
 """Copies of `urdfkin.kinematics.equations` that call other functions.
 
-For example, in `array_equations` of `urdfkin.kinematics.number_kinds`, `plus` is `np.add`.
+For example, the copies in `urdfkin.kinematics.number_kinds.array_equations` call `np.add` instead of `plus`.
 
 This module does not import NumPy.
 """
@@ -19,9 +19,9 @@ VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transp
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return copies of the functions in `equations` that call the functions `vectors` instead of their own.
+    """Return copies of the functions in `equations` that call replacements such as `plus` and `cross`.
 
-    The keys of `vectors` are names of functions in `equations`. `decorate` is applied to each copy.
+    `vectors` contains the replacements by name. `decorate` is applied to each copy.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -35,11 +35,11 @@ def rebind_functions(
 ) -> dict[str, Any]:
     """Return copies of all functions of the modules, by name.
 
-    The copies call other copies and the replacements.
+    Each copy calls copied functions and replacements instead of the original functions.
 
     Args:
-        modules: A module comes after the modules from which it imports functions, for example
-            `recursion, outputs`.
+        modules: Modules in import order. For example, `outputs` imports from `recursion` and therefore
+            follows `recursion`.
         decorate: Decorator of each copy. A replacement of a copied function is not decorated.
         replacements: Functions or modules by name.
     """

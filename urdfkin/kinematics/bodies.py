@@ -13,14 +13,15 @@ The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook
 | `representation` | | SciPy's name of an Euler sequence, or "quaternion" |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape;
-six-vectors are [linear; angular]; units are metres, radians and seconds.
+Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape.
+Six-vectors are [linear; angular]. Units are metres, radians and seconds.
 
-There are two Jacobians; the textbook warns that the two are often confused. The velocity Jacobian J_v (...,
-6, n) converts joint velocities to the linear and the angular velocity of the end frame. The manipulator
-Jacobian J converts joint velocities to x-dot, where x = (position, orientation). Another name for J is
-analytical Jacobian. For three Euler angles in any sequence (the textbook uses "ZYZ"), x has 6 numbers and J
-is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J is (..., 7, n).
+There are two Jacobians, which are often confused. The velocity Jacobian J_v (..., 6, n) converts joint
+velocities to the linear and the angular velocity of the end frame. The vector x contains the position and the
+orientation of the end frame. The manipulator Jacobian J converts joint velocities to the time derivative of
+x. Another name for J is analytical Jacobian. For three Euler angles in any sequence (the textbook uses
+"ZYZ"), x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7
+numbers and J is (..., 7, n).
 
 | Argument | InputError for |
 |---|---|
@@ -28,8 +29,8 @@ is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbe
 | axis | a length other than 1 |
 | rotation matrix | a matrix that is not a rotation |
 
-An unknown `representation` raises UnknownNameError. A distance of `nearest` or less from the
-singularity of Euler angles raises RepresentationSingularityError.
+An unknown `representation` raises UnknownNameError. Functions with the argument `nearest` raise
+RepresentationSingularityError within this distance of the singularity of Euler angles.
 """
 
 from __future__ import annotations
@@ -132,7 +133,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """The terms w x p, R v_1 and d-dot of a velocity (7.124), m/s."""
+    """The three terms w x p, R v_1 and d-dot of a point's velocity (7.124), in m/s."""
 
     rotation: FloatArray
     relative: FloatArray
@@ -145,7 +146,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """The terms of a point's acceleration (7.125), m/s^2."""
+    """The terms of a point's acceleration (7.125), in m/s^2."""
 
     transverse: FloatArray
     centripetal: FloatArray
@@ -167,7 +168,7 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
     """Return the terms of a point's velocity (7.124; 7.59 if v_1 = 0).
 
-    p-dot_0 = w x R p_1 + R v_1 + d-dot_01
+    The velocity is `w x R p_1 + R v_1 + d-dot_01`.
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
@@ -180,7 +181,7 @@ def point_acceleration(
 ) -> AccelerationParts:
     """Return the terms of a point's acceleration (7.125; 7.123 if v_1 = a_1 = 0).
 
-    p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot
+    The acceleration is `alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot`, with p = R p_1.
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -266,7 +267,7 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     """Convert the velocity of frame n to the velocity of the tool.
 
-    d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, in frame 0
+    In frame 0, the linear velocity of the tool is `d-dot_0n + w x d_{n,tool}`.
     """
     velocity, d = as_vectors(velocity, "velocity", 6), as_vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -275,7 +276,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Convert the tool's velocity to frame n (7.115)."""
+    """Convert the tool's velocity to the velocity of frame n (7.115)."""
     return tool_velocity(velocity, -as_vectors(d_n_tool, "d_n_tool"))
 
 
@@ -301,8 +302,8 @@ def pose_rate_inverse(
 ) -> FloatArray:
     """Return C^-1 in x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C (6, 7) has several right inverses C^-1: C C^-1 = I.
-    The returned inverse gives rates perpendicular to the quaternion.
+    For a quaternion, C (6, 7) has several right inverses with `C C^-1 = I`. The function returns the inverse
+    that gives rates perpendicular to the quaternion.
     """
     if representation == QUATERNION:
         return _block_diagonal(quaternion_rate_matrix(quaternion_of(R)))

@@ -1,9 +1,9 @@
 """The equations of motion of sections 7.3 to 7.7 of the textbook, for all kinds of numbers.
 
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
-because the equations use the arithmetic of their arguments. Each equation is written only once. Kinds of
-numbers: batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors,
-LaTeX expressions.
+because the equations use the arithmetic of their arguments. Each equation is written only once. The kinds of
+numbers are batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors,
+and LaTeX expressions.
 
 For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the functions of the
 section "vectors".
@@ -19,10 +19,10 @@ section "vectors".
 | `z`, `v`, `a` | a joint's axis, velocity and acceleration; z is fixed to the link before the joint |
 | `p`, `u`, `b` | position, velocity and acceleration of a point in a moving frame |
 | `o`, `u` | angular and linear velocity of a planar or floating joint |
-| `b` | for such a joint: time derivatives of the components of o or u |
+| `b` | time derivatives of the components of o or u |
 
-All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
-own axes. In the link's own axes, z and the offset of an `<origin>` are constant.
+All vectors of an equation are expressed in the same axes. These are the world's axes, as in the textbook, or
+the link's own axes. In the link's own axes, z and the offset of an `<origin>` are constant.
 
 The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
 and follows joint i. In a URDF, the frame of a joint lies on the joint's own axis. The `<origin>` of joint i
@@ -110,7 +110,7 @@ def point_position(d, R, p):
 
 
 def interorigin_vector(d, z, a, x):
-    """7.64: distance d along the axis z plus length a along x."""
+    """7.64: interorigin vector, the sum of d along the axis z and a along x."""
     return plus(times(d, z), times(a, x))
 
 
@@ -130,7 +130,7 @@ def tangential(w, d):
 def point_velocity(vel, w, d):
     """7.59, 7.115, 7.128: velocity of a point Q of a link.
 
-    Point P has the velocity vel; the vector d leads from P to Q.
+    Point P has the velocity vel. The vector d leads from P to Q.
     """
     return plus(vel, tangential(w, d))
 
@@ -171,7 +171,7 @@ def angular_acceleration(alpha, w, z, v, a):
 def point_acceleration(acc, alpha, w, d):
     """7.123, 7.130: acceleration of a point Q of a link.
 
-    Point P has the acceleration acc; the vector d leads from P to Q.
+    Point P has the acceleration acc. The vector d leads from P to Q.
     """
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
@@ -188,7 +188,7 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 # -- planar and floating joints -----------------------------------------------------------------------
 # The joint's velocity is expressed in the axes of the link after the joint.
-# The vector b contains the time derivatives of the components of this velocity.
+# The vector b contains the time derivatives of the joint velocity's components.
 # The axes of the link after the joint rotate with the angular velocity w + o.
 
 
@@ -206,7 +206,10 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85: column [z x d; z]; d leads from the joint to the frame."""
+    """7.80, 7.85: column [z x d; z] of a revolute joint.
+
+    The vector d leads from the joint to the frame.
+    """
     return cross(z, d), z
 
 
@@ -230,7 +233,8 @@ def rate_in_turning_axes(rate, w, x):
 
 
 # -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
-# Time derivative of column i (7.126): sum over all joints j of d(column i)/dq_j * v_j
+# The time derivative of column i is a sum over all joints j (7.126):
+#     `d(column i)/dq_j * v_j`
 
 
 def derivative_by_earlier_joint(w, linear, angular):
@@ -242,8 +246,9 @@ def derivative_by_earlier_joint(w, linear, angular):
 
 
 def derivative_by_later_joint(z, linear):
-    """7.85: derivative of joint i's vector z x d with respect to joint j > i.
+    """7.85: derivative of the linear part of column i with respect to joint j > i.
 
+    z:       axis of joint i
     linear:  linear part of column j
     """
     return cross(z, linear)

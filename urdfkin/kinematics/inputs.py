@@ -1,4 +1,4 @@
-"""Validation of vectors, matrices and rotations, and conversion to float64 arrays with leading batch axes."""
+"""Check vectors, matrices and rotations, and convert them to float64 arrays."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ UNIT_TOLERANCE = 1e-12
 #: The absolute values of the entries in a row of R sum to at most sqrt(3).
 #: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: Letters of NumPy's `dtype.kind` for data that are not real numbers:
-#: c complex, S bytes, U text, m timedelta, M datetime, V void.
+#: Values of NumPy's `dtype.kind` for data that are not real numbers.
+#: The letters mean complex (c), bytes (S), text (U), timedelta (m), datetime (M) and void (V).
 #: For example, NumPy converts dates and the text "1.5" to floats without reporting an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
@@ -46,7 +46,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether any element is masked; NumPy's `asarray` ignores masks."""
+    """Return whether any element is masked. NumPy's `asarray` ignores masks."""
     if is_instance(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
@@ -98,7 +98,7 @@ def as_rotations(value: ArrayLike, name: str) -> FloatArray:
 def rotation_defect(R: FloatArray) -> FloatArray:
     """Return the largest absolute entry of R R^T - I.
 
-    A computed determinant <= 0 or an overflow gives inf.
+    Return inf if the determinant is not positive or R R^T overflows.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))

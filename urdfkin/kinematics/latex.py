@@ -29,7 +29,7 @@ _SYMBOLS = {
     "one": "1",
 }
 #: LaTeX symbols that apply only to the parameters of one function. The keys are function names.
-#: An entry for a function has priority over `_SYMBOLS`.
+#: These symbols override `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},

@@ -15,15 +15,16 @@ State = TypeVar("State")
 Intermediate = TypeVar("Intermediate")
 
 _MOST_STEPS = 100
-#: First, smallest and largest damping, relative to the largest singular value.
+#: First, smallest and largest damping, as multiples of the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: Factor of the damping after a step that reduces the error, and factor after a rejected step.
+#: The damping is multiplied by the first factor after an accepted step.
+#: The damping is multiplied by the second factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: A step is slow if new error > _SLOW_STEP_RATIO * old error.
+#: A step is slow if the new error is more than this fraction of the old error.
 _SLOW_STEP_RATIO = 0.99
 #: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: The norm of n residuals has a relative rounding error of at most this number times n eps.
+#: The norm of n residuals has a relative rounding error of at most `_NORM_ROUNDING * n * eps`.
 _NORM_ROUNDING = 4.0
 
 
@@ -42,11 +43,11 @@ def least_squares(
 
     Args:
         start: First state.
-        residuals: Returns the residuals (n,) of a state, and a value for `derivatives`.
-        derivatives: Returns the matrix with the entries -d(residual i)/d(parameter j).
-        move: Returns the state after a step (parameters,).
+        residuals: Computes the residuals (n,) of a state, and a value that is passed to `derivatives`.
+        derivatives: Computes the negative derivatives (n, parameters) of the residuals.
+        move: Applies a step (parameters,) to a state and returns the new state.
         max_step: Upper bound on the absolute value of each component of a step.
-        patience: The search ends after this number of consecutive slow steps; 0 means no limit.
+        patience: Largest number of consecutive slow steps. 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

@@ -18,7 +18,7 @@ NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) 
 from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
-#: The five bounds (p, w, vel, alpha, acc).
+#: Bounds of a link's position p, angular velocity w, velocity vel, and accelerations alpha and acc.
 LinkBounds = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 

@@ -13,7 +13,7 @@ The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 | `name` | | Euler sequence with SciPy's name |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-The dots stand for any batch shape; results have the batch shape of the arguments.
+The dots stand for any batch shape. Results have the batch shape of the arguments.
 
 | Argument | InputError for |
 |---|---|
@@ -24,21 +24,21 @@ The dots stand for any batch shape; results have the batch shape of the argument
 
 A user's matrix often has only a few digits. Quaternions, Euler angles and Gram-Schmidt give different
 rotations for the same rounded matrix. `nearest_rotation` and `polar_factor` return the rotation that is
-nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors; `polar_factor` accepts
-errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar decomposition
-M = U H.
+nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors, and `polar_factor`
+accepts errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar
+decomposition M = U H.
 
-A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
-quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
+A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration. The scalar qw is the textbook's
+q0. A quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
 velocity in the fixed frame 0, as in the textbook. With `frame="body"`, functions express the angular velocity
-in the body's own frame. Quaternion rates have no singularity. `integrate_orientation` integrates quaternion
-rates, because the integral of the angular velocity is not an orientation (example 7.3).
+in the body's own frame. Quaternion rates have no singularity. The integral of an angular velocity is not an
+orientation (example 7.3). Therefore, `integrate_orientation` integrates quaternion rates.
 
-Euler angles have 24 sequences. A name has three letters, in the order of the angles. Capital letters are axes
-that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the
-URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. A distance of `nearest` or less from
-the singularity raises RepresentationSingularityError. The functions for Euler angles express angular
-velocities in the fixed frame 0.
+Euler angles have 24 sequences. The three letters of a sequence are the axes of the three angles. Capital
+letters are axes that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes:
+"xyz" is the URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. Functions with the
+argument `nearest` raise RepresentationSingularityError within this distance of the singularity. The functions
+for Euler angles express angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -101,13 +101,14 @@ UNCHANGED_MATRIX_TOLERANCE = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
-    """Return the nearest rotation to a rounded rotation matrix.
+    """Return the nearest rotation to a rotation matrix M, which may be rounded to nine decimals.
 
-    M: a rotation matrix with entries that may be rounded to nine decimals
-    result = M - M (M^T M - I)/2, one Newton step (Bjorck and Bowie)
-    M = U (I + E):  result = U (I - 3/2 E^2)
-    |E| <= 3e-9
-    error <= 3/2 |E|^2 <= 1.4e-17, an eighth of eps/2 = 1.1e-16
+    The result is one Newton step (Bjorck and Bowie):
+
+        `M - M (M^T M - I)/2`
+
+    With M = U (I + E), the result is U (I - 3/2 E^2). Since |E| <= 3e-9, the error is at most 3/2 |E|^2,
+    about 1.4e-17. This is an eighth of eps/2 = 1.1e-16.
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -175,7 +176,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
         ws: (..., n, 3) angular velocities of frame i + 1 relative to frame i, in frame i.
 
     Returns:
-        Angular velocity of frame n in frame 0.
+        (..., 3) angular velocity of frame n relative to frame 0, in frame 0.
     """
     Rs, ws = as_rotations(Rs, "Rs"), as_vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -208,7 +209,7 @@ def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 def rotation_from_quaternion(quat: ArrayLike) -> FloatArray:
     """Return a unit quaternion's rotation.
 
-    R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q)
+    The rotation matrix is `(q0^2 - q.q) I + 2 q q^T + 2 q0 S(q)`.
     """
     rows = eq.rotation_of_quaternion(*np.moveaxis(normalise_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
@@ -238,7 +239,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
     """Multiply two quaternions of any length.
 
-    R(left right) = R(left) R(right)
+    The product's rotation is `R(left) R(right)`.
     """
     left, right = as_vectors(left, "left", 4), as_vectors(right, "right", 4)
     p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
@@ -258,9 +259,8 @@ ExpressedIn = Literal["fixed", "body"]
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
     """Return E in (q-dot, q0-dot) = E w (7.57).
 
-    frame="fixed":  E = 1/2 [q0 I - S(q); -q^T]
-    frame="body":   E = 1/2 [q0 I + S(q); -q^T]
-    E^T E = I/4,  E^T (q, q0) = 0
+    For the fixed frame, E is `1/2 [q0 I - S(q); -q^T]`. For the body frame, E is `1/2 [q0 I + S(q); -q^T]`.
+    In both cases, `E^T E = I/4` and `E^T (q, q0) = 0`.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -290,11 +290,11 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate 7.57 by the fourth-order Runge-Kutta method; return the quaternions (n, ..., 4) at n times.
+    """Return the quaternions (n, ..., 4) at n times, by the fourth-order Runge-Kutta method for 7.57.
 
     `quat` is the orientation at the first time. The `times` (s) increase. `w(t)` is the angular velocity
-    (rad/s), expressed in `frame`. A jump of `w` must be at one of the `times`, because no step evaluates `w`
-    at one of the `times`.
+    (rad/s), expressed in `frame`. Each jump of `w` must be at one of the `times`. The steps evaluate `w` only
+    between the `times`.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -336,7 +336,7 @@ def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return Rodrigues' rotation (7.28).
 
-    R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi)
+    The rotation matrix is `I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi)`.
     """
     axis = as_unit_vectors(axis, "axis")
     angle = as_finite(angle, "angle")[..., np.newaxis, np.newaxis]
@@ -357,7 +357,10 @@ def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return the velocity phi-dot k x p (7.21)."""
+    """Return the velocity of a point p that rotates about the axis k (7.21).
+
+    The velocity is `phi-dot k x p`.
+    """
     return np.cross(angular_velocity_about(axis, rate), as_vectors(p, "p"))
 
 
@@ -382,13 +385,13 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 def log_rotation(R: ArrayLike) -> FloatArray:
     """Return the rotation vector phi k.
 
-    The angle is in [0, pi]. For the angle pi, k may have either sign.
+    The angle is in [0, pi]. If the angle is pi, the sign of k is arbitrary.
     """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # Squares of components below 1e-150 may lose digits. If |vector| < 1e-150, the result is 2 * vector.
+    # The squares of components below 1e-150 may underflow. If |vector| < 1e-150, the result is 2 * vector.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
@@ -408,7 +411,7 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 _AXIS_LETTERS = "xyz"
 _TRIPLES = [a + b + c for a in _AXIS_LETTERS for b in _AXIS_LETTERS for c in _AXIS_LETTERS if a != b != c]
-#: Twelve Euler sequences about moving axes, twelve about fixed axes.
+#: The first twelve sequences have moving axes. The last twelve have fixed axes.
 EULER_SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
@@ -437,7 +440,7 @@ class EulerSequence:
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Reverse the order of the values if the axes are fixed."""
+        """Reverse the last axis of an array if the rotation axes are fixed."""
         return values[..., ::-1] if self.is_fixed else values
 
 
@@ -458,7 +461,7 @@ def _make_sequence(name: str) -> EulerSequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz for the axis 0, 1 or 2; the constant entries are exactly 0 and 1."""
+    """Return Rx, Ry or Rz for the axis 0, 1 or 2. The constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -472,7 +475,7 @@ def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
 def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
     """Return the rotation of Euler angles.
 
-    R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
+    For "ZYZ", the rotation is `Rz(phi) Ry(theta) Rz(psi)`.
     """
     axes = find_sequence(name)
     turns = axes.reorder(as_vectors(angles, "angles"))
@@ -493,8 +496,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     | other | [-pi/2, pi/2] |
 
     At the singularity, only the sum or difference of the first and third angle is determined. For moving
-    axes, the first angle is arbitrary (0 for exact entries of R), and the third angle completes the rotation.
-    For fixed axes, the third angle is arbitrary, and the first angle completes the rotation.
+    axes, the first angle is arbitrary, and the third angle follows from the first angle. For fixed axes, the
+    third angle is arbitrary, and the first angle follows from the third angle. For exact entries of R, the
+    arbitrary angle is 0.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.
@@ -507,8 +511,7 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
     # F, S and T are rotations about the three axes.
     # R = F S T, so F^T R = S T.
-    # S turns about axis `j`.
-    # Therefore, S T and T have the same row `j`.
+    # S is a rotation about axis `j`. Therefore, row `j` of S T is row `j` of T.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
     # Row `j` has nonzero entries only for the second axis and `rest`.
@@ -537,7 +540,7 @@ MIN_SINGULARITY_DISTANCE = 1e-9
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     """Return Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    The columns are the rotation axes in frame 0.
+    The columns of Omega are the three rotation axes in frame 0.
     """
     axes = find_sequence(name)
     turns = axes.reorder(as_vectors(angles, "angles"))
@@ -564,13 +567,16 @@ def euler_rates(
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE) -> FloatArray:
     """Return Omega^-1 in closed form (7.56).
 
-    F:              rotation by the first angle
-    w' = F^T w:     w in the frame after F
-    r_1, r_2, r_3:  rates of the three angles
-    w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)
-    r_3 = w'_other / across
-    r_2 = w'_second
-    r_1 = w'_first - along r_3
+    F is the rotation by the first angle, and w' = F^T w. The rates r_1, r_2 and r_3 of the three angles
+    satisfy:
+
+        `w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)`
+
+    The three components of this equation give the rates:
+
+        `r_3 = w'_other / across`
+        `r_2 = w'_second`
+        `r_1 = w'_first - along r_3`
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
@@ -606,15 +612,14 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the condition number of Omega.
+    """Return the condition number of Omega, cot(d / 2).
 
-    The second axis is perpendicular to the first and third axis.
-    Let d <= pi/2 be the angle between the lines of the first and third axis.
+    The angle d is the angle between the lines of the first and the third rotation axis, from 0 to pi/2. The
+    second axis is perpendicular to both. Therefore, Omega has these singular values:
 
-        singular values of Omega:  1, sqrt(1 + cos d), sqrt(1 - cos d)
-        condition number:          cot(d/2)
+        `1, sqrt(1 + cos d), sqrt(1 - cos d)`
 
-    The singularity itself, d = 0, raises RepresentationSingularityError.
+    At the singularity, d is 0, and the function raises RepresentationSingularityError.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

@@ -2,12 +2,11 @@
 
 All tolerances of urdfkin use these bounds:
 
-    tolerance = count * eps * scale
-    eps = 2^-52
-    error of one operation <= eps/2 times the rounded number
-    scale = upper bound on the sum of the absolute values of the result's terms
+    `tolerance = count * eps * scale`
 
-This module defines the counts, to first order in eps.
+The number eps is 2^-52. The error of one operation is at most eps/2 times the rounded number. The scale is an
+upper bound on the sum of the absolute values of the result's terms. This module defines the counts, to first
+order in eps.
 
 | Scale | Module |
 |---|---|
@@ -63,15 +62,15 @@ If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix
 | standard deviation of uniformly distributed rounding errors | 3.3 |
 | `PINOCCHIO_ROUNDINGS`, seven times this standard deviation | 24 |
 
-Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis:
+Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. The rotation Q turns the
+file's axis to the coordinate axis. The angle t of Q is the tilt. The replacement changes the joint's rotation
+R by at most 2 t:
 
-    Q: rotation that turns the file's axis to the coordinate axis
-    t: angle of Q, the tilt
-    |Q R Q^T - R| <= 2 |Q - 1| <= 2 t
-    error of a rotated vector, or of a translation along the axis <= 2 t
-    additional error of each factor, for all frames after the joint = 2 t = (2 t / eps) eps
+    `|Q R Q^T - R| <= 2 |Q - 1| <= 2 t`
 
-If t > eps, urdfkin reports the finding URDF514.
+Therefore, a rotated vector and a translation along the axis have an error of at most 2 t. For all frames
+after the joint, each factor has the additional error 2 t, which is 2 t / eps in eps. If t > eps, urdfkin
+reports the finding URDF514.
 
 **An export.** Exported code (`urdfkin.export`) computes the same equations, with these changes:
 
@@ -116,13 +115,12 @@ The counts of an export's joint are
 
 The errors of an export and of urdfkin have the same standard deviation.
 
-**Single precision.** `urdfkin.export.function` computes a bound for each number of a test vector:
+**Single precision.** `urdfkin.export.function` computes a bound for each number of a test vector. Each
+operation and each constant has a value x. The bound is the sum of these products over all x:
 
-    eps = 2^-23
-    x: value of an operation or of a constant
-    bound = sum over all x of (rounding error of x) * |derivative of the result with respect to x|
+    `(rounding error of x) * |derivative of the result with respect to x|`
 
-The error of one operation is
+With eps = 2^-23, the error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -197,9 +195,9 @@ The counts, with u = eps/2, are
 
 **MJCF equalities.** The tree's mimic rules satisfy an equality in an MJCF file up to rounding:
 
-    equality: y - y0 = c0 + c1 (x - x0)
-    x, y: values of two joints
-    x0, y0: reference values
+    `y - y0 = c0 + c1 (x - x0)`
+
+The numbers x and y are the values of two joints. The numbers x0 and y0 are reference values.
 
 | | |
 |---|---|
@@ -209,16 +207,15 @@ The counts, with u = eps/2, are
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
 | sum, at most `MJCF_MIMIC_ROUNDINGS` = 8 | 7.5 |
 
-    tolerance = MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)
-    k: number of mimic rules between the mimic joint and the independent joint
+With k mimic rules between the mimic joint and the independent joint, the tolerance is:
 
-**Numbers near zero.** A product below the smallest normal number loses bits:
+    `MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)`
 
-    n = smallest normal number
-    smallest subnormal number = eps n = 2^-1074
-    error of the product <= eps n / 2 = 2^-1075
-    every scale except 0 >= n (`urdfkin.kinematics.number_kinds`)
-    tolerance = count * eps * scale >= count * eps n > 2^-1075
+**Numbers near zero.** A product below the smallest normal number n loses bits. The smallest subnormal number
+is eps n = 2^-1074, so the error of the product is at most 2^-1075. Every nonzero scale is at least n
+(`urdfkin.kinematics.number_kinds`). Therefore, the tolerance is larger than this error:
+
+    `count * eps * scale >= count * eps n > 2^-1075`
 
 A later product with a large number multiplies the error and the scale by the same factor.
 
@@ -249,22 +246,24 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: Value of `eps * scale` for the smallest nonzero scale (`SMALLEST_NORMAL`).
+#: `eps * scale` for the smallest nonzero scale, which is `SMALLEST_NORMAL`.
 SMALLEST_SUBNORMAL = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
-#: urdfkin and Pinocchio may differ by at most joints * factors * PINOCCHIO_ROUNDINGS * eps * scale.
-#: A tilt increases this limit. `joints` is the number of joints of the path plus one, or plus two for a
-#: rotated base. The docstring above derives these rules.
+#: Without tilts, this is the allowed difference between urdfkin and Pinocchio:
+#:     `joints * factors * PINOCCHIO_ROUNDINGS * eps * scale`
+#: `joints` is the number of joints of the path plus one, or plus two for a rotated base.
 #: `factors` is the number of factors of a term. For example, the term w x (w x d) has three factors.
+#: The docstring above derives these rules.
 PINOCCHIO_ROUNDINGS = 24.0
-#: urdfkin and MuJoCo may differ by at most joints * factors * MUJOCO_ROUNDINGS * eps * scale.
-#: `joints` is the same number as for Pinocchio.
-#: `factors` is 2 * (`factors` for Pinocchio).
-#: A term has more factors because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
+#: This is the allowed difference between urdfkin and MuJoCo:
+#:     `joints * factors * MUJOCO_ROUNDINGS * eps * scale`
+#: `joints` is the number of joints that `PINOCCHIO_ROUNDINGS` defines.
+#: `factors` is twice the number of factors that `PINOCCHIO_ROUNDINGS` defines.
+#: MuJoCo's terms have more factors, because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
-#: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
+#: Allowed error (in eps) of a mimic rule of an MJCF file that MuJoCo evaluates.
 MJCF_MIMIC_ROUNDINGS = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW_ROUNDINGS = 8.0
@@ -289,68 +288,61 @@ SINGLE_POLYNOMIAL_ERROR = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference of the constant poses that two programs compute from the same file, in eps per joint.
-#: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
-#: These four counts are in rows 1 and 3 of the first table in the docstring above.
-#: Standard deviation: 2.4 eps.
-#: 13.7 eps / 2.4 eps = 5.7.
+#: The largest possible difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
+#: The four counts are in rows 1 and 3 of the table "A joint" in the docstring above.
+#: The standard deviation is 2.4 eps, so the allowed difference is 5.7 standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Rounding errors in the directions of two joint axes, in eps.
-#: Each axis: 0.5 from the division by its length, and 2.0 from Rodrigues' formula.
+#: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
 AXIS_ROUNDINGS = 5.0
 #: Error of the angle between consecutive axes, in eps per joint.
 #: Angles in a file are rounded.
-#: An angle with fifteen digits (DBL_DIG) has an error of half a unit of its last digit:
-#: 5e-15 rad, or 22.5 eps, for angles up to pi.
+#: An angle with fifteen digits (DBL_DIG) has an error of half a unit of its last digit.
+#: For angles up to pi, this error is 5e-15 rad, or 22.5 eps.
 #: If both joint axes are z axes, roll and pitch both change the angle between the joint axes.
 #: Yaw does not change this angle.
 #: Therefore, the error is twice 22.5 eps.
 FILE_ANGLE_ROUNDINGS = 45.0
-#: Rounding error of a length along a joint axis.
-#: The unit of the error is eps times the length of the path.
+#: Rounding error of a length along a joint axis, as a multiple of eps times the path length.
 #: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
-#: Few sums of lengths are nearly as large as the length of the path.
+#: Few sums of lengths are nearly as large as the path length.
 LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.
 
-#: Rounding error (in eps rad) of an angle between -pi and pi.
+#: Rounding error (in multiples of eps rad) of an angle between -pi and pi.
 #: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
 #: The rounding of a file's angle to a double has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
-#:
-#:     entry = a x - b y:               0.75
-#:     x = c d - e f,  y = g h - k l:   0.75
+#: An entry is `a x - b y`, and this difference has an error of 0.75.
+#: The factors x and y are differences of two products, also with an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
-#: A length is rounded to twelve digits if the length changes by at most this number.
-#: The unit of the change is eps times the length of the path.
+#: A length is rounded to twelve digits if the change is at most this number times eps times the path length.
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
-#: The second rotation is a product of three rotations.
-#: The product's error is the sum of four errors.
-#: The sines and the cosines have an error of 0.5 each.
-#: The two matrix multiplications have the errors 1.4 and 1.8.
+#: The second rotation is a product of three rotations, with an error of 4.2 eps:
+#: 0.5 for the sines, 0.5 for the cosines, 1.4 for the first multiplication, and 1.8 for the second.
 ROTATION_ROUNDINGS = 8.0
 
-#: Allowed error (in eps) of a mimicked joint's computed limit.
-#: urdfkin computes this limit from a mimic joint's limit.
-#: The computed limit is (limit of the mimic joint - offset) / multiplier: a subtraction and a division.
+#: Allowed error (in eps) of a mimicked joint's limit that urdfkin computes from a mimic joint's limit.
+#: The computation of the limit has a subtraction and a division:
+#:     `(limit of the mimic joint - offset) / multiplier`
 #: The mimic rule has a multiplication and an addition.
-#: Each of these four operations has an error of 0.5.
-#: The sum of the four errors is 2.0.
-#: urdfkin narrows the range of the mimicked joint at each end by twice this sum.
-#: The mimic joint's limits then accept both ends.
+#: Each of these four operations has an error of 0.5, so the sum is 2.0.
+#: urdfkin moves each end of the mimicked joint's range inwards by 4.0, twice the sum.
+#: Therefore, the mimic joint's limits accept both ends of the narrowed range.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference between urdfkin and Pinocchio for `factors` = 1, in eps.
+    """Return the allowed difference (eps) between urdfkin and Pinocchio for a term with one factor.
 
-        PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps
+        `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 
-    `joints` is the number of joints of the path plus the additional joints that the caller counts, for
-    example 1 as for `PINOCCHIO_ROUNDINGS`. `tilt` is the sum of the tilts (rad) of the path's joints.
+    `joints` is usually the number that `PINOCCHIO_ROUNDINGS` defines. `tilt` is the sum of the tilts (rad) of
+    the path's joints.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]
@@ -367,9 +359,7 @@ def table_roundings(rows: int) -> float:
 
 
 def written_urdf_roundings(rows: int) -> float:
-    """Return the allowed difference (eps) between the poses of a table and of its URDF.
-
-    The URDF was written from the table:
+    """Return the allowed difference (eps) between a table's pose and the pose of the URDF written from it.
 
     | Error | Multiple of `table_roundings(rows)` |
     |---|---|
@@ -381,7 +371,7 @@ def written_urdf_roundings(rows: int) -> float:
 
 
 def fitted_table_roundings(rows: int) -> float:
-    """Return the allowed difference (eps) between the poses of a URDF and of the table fitted to the URDF.
+    """Return the allowed difference (eps) between a URDF's pose and the pose of its fitted table.
 
     After the last iteration of the fit, the error of the pose is at most 12.5 * table_roundings(rows).
     """

@@ -16,9 +16,9 @@ from urdfkin.model.tree import FloatArray, freeze
 class BaseMotion:
     """Motion of the robot's root link relative to the world.
 
-    In the textbook, the world frame has the number -1. Every field may have leading batch axes. The
-    batch axes of all fields broadcast with the batch axes of the configuration. The fields store the given
-    numbers unchanged, because a verification computes Pinocchio's input from these numbers.
+    In the textbook, the world frame has the number -1. Every field may have leading batch axes, which
+    broadcast with the batch axes of the configuration. The fields store the given numbers unchanged, because
+    a verification computes Pinocchio's input from these numbers.
 
     Attributes:
         placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded to nine decimals. The results
@@ -55,7 +55,10 @@ class BaseMotion:
             _ = self.batch_shape
         except ValueError:
             shapes = f"{self.placement.shape}, {self.velocity.shape}, {self.acceleration.shape}"
-            raise InputError("the batch shapes of the base's fields do not broadcast", found=shapes) from None
+            raise InputError(
+                "the batch shapes of the base's placement, velocity and acceleration do not broadcast",
+                found=shapes,
+            ) from None
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
             raise InputError("the last row of the base's placement must be 0 0 0 1")
         R = nearest_rotation(self.placement[..., :3, :3], "the rotation of the base's placement")
@@ -77,10 +80,10 @@ class BaseMotion:
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """Return the rows [R, p, w, v, alpha, a] for the kernels.
+        """Return the motion as rows [R, p, w, v, alpha, a], which the kernels read.
 
         Returns:
-            (n, 24) rows; n is 1 if no field has batch axes.
+            (n, 24) rows. If no field has batch axes, n is 1.
 
         >>> BaseMotion().state(()).shape
         (1, 24)

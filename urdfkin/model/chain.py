@@ -1,11 +1,11 @@
 """A path between two frames as a sequence of joint axes.
 
 As in section 7.5 of the textbook, the axis of joint i is z_{i-1} at O_{i-1}. A revolute joint rotates about
-this axis, and a prismatic joint translates along this axis. The vector d_{i-1,i} leads from O_{i-1} to O_i.
-The path may lead from parent to child, from child to parent, or through a common ancestor. An example is the
-path from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes
-a joint backwards, from child to parent, the joint's axis is reversed. The joint's coordinate keeps the sign
-of the URDF. The reason is that the inverse of a rotation by q about z is a rotation by q about -z.
+z_{i-1}, and a prismatic joint translates along z_{i-1}. The vector d_{i-1,i} leads from O_{i-1} to O_i. The
+path may lead from parent to child, from child to parent, or through a common ancestor. An example is the path
+from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes a
+joint backwards, from child to parent, the joint's axis is reversed. Then the joint's coordinate keeps the
+sign of the URDF, because the inverse of a rotation by q about z is a rotation by q about -z.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Minimum size (m) of a robot in a comparison.
-#: If all frames have the same origin, the computed size of the robot is 0.
+#: Minimum size (m) of a robot in a comparison of mechanisms.
+#: The computed size is 0 if all frames have the same origin.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -44,10 +44,10 @@ class ChainJoint:
     """One moving joint on a path.
 
     Attributes:
-        backwards: Whether the path leads from child to parent.
-        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. Its z axis is the joint's axis. If
-            `backwards` is true, z has the opposite direction.
-        mimic: None for an independent joint.
+        backwards: True if the path leads from child to parent.
+        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. The z axis of the pose is the joint's axis,
+            or the reversed axis if `backwards` is true.
+        mimic: The mimic rule, or None for an independent joint.
     """
 
     name: str
@@ -72,9 +72,9 @@ class FrameChain(Displayable):
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame; in the base frame if `joints` is empty.
+        T_last_tip: (4, 4) pose of the tip in the last joint's frame, or in the base frame without joints.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
-            upper bound on the translation in A_k. Other rotations of the fixed joints give the same bound.
+            upper bound on the translation in A_k. The bound does not depend on the fixed joints' rotations.
         pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.
 
     >>> import urdfkin
@@ -147,7 +147,7 @@ class FrameChain(Displayable):
 
     @property
     def constants(self) -> tuple[FloatArray, ...]:
-        """The n + 1 constant poses A_0 ... A_n.
+        """The n + 1 constant poses, from A_0 to A_n.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -187,7 +187,7 @@ class FrameChain(Displayable):
         Each joint frame is the frame before the joint's motion.
 
         Args:
-            q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
+            q: (..., coordinates) in the order of `joint_names`, or None for the zero configuration.
 
         Returns:
             (..., n + 1, 4, 4) poses in the base frame.
@@ -228,7 +228,7 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the origins of the n joints and of the tip (..., n + 1, 3) in the base frame, m.
+        """Return the origins (..., n + 1, 3) of the n joints and of the tip in the base frame (m).
 
         Without `q`, the configuration is zero.
 
@@ -242,7 +242,7 @@ class FrameChain(Displayable):
     def interorigin(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the interorigin vectors (..., n, 3) in the base frame, m.
 
-        The vector d_{i-1,i} leads from O_{i-1} to O_i. The last vector leads to the tip. Without `q`, the
+        The vector d_{i-1,i} leads from O_{i-1} to O_i. O_n is the origin of the tip. Without `q`, the
         configuration is zero.
 
         >>> import urdfkin
@@ -267,8 +267,8 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
-            # Before the motion is a rotation to the axis. The rotation and the pose each count as one pose.
+            # On a path from child to parent, a rotation to the joint's axis comes first. The joint's motion
+            # and the joint's constant pose follow. The rotation and the pose each count as one pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
@@ -280,7 +280,7 @@ def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint
     """Return the joints from `base` to `tip`.
 
     Returns:
-        Pairs (joint, whether the path leads from child to parent).
+        Pairs of a joint and a bool, which is True if the path leads from child to parent.
     """
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0

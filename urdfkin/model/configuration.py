@@ -47,13 +47,12 @@ from urdfkin.model.tree import (
 )
 
 #: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
-#: If the limits of a joint allow only larger values, `sample` draws larger values.
+#: If the limits of a joint exclude all of these values, `sample` draws larger values.
 #: For a revolute or prismatic joint without limits, `sample` draws from -10 to 10 (rad or m).
 #: For a continuous joint, `sample` draws from -pi to pi.
 #: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
 #: These are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.
-#: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
 #: Text of the condition under which an upper bound holds.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
@@ -108,10 +107,10 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with one coordinate, within -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`.
+    """Return the range of each joint that has one coordinate.
 
-    If the limits exclude this interval, the range begins at the limit nearest to 0, with at most the length
-    `ASSUMED_LIMIT`. Limits of mimic joints are ignored.
+    A range is limited to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. A range outside this interval
+    is limited to the length `ASSUMED_LIMIT`, from its end nearest to 0. Limits of mimic joints are ignored.
     """
 
     def own_range(joint: Joint) -> tuple[float, float]:
@@ -128,9 +127,9 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint, reduced by the limits of the joints that mimic it.
+    """Return the range of each joint, reduced by the limits of its mimic joints.
 
-    If these limits allow at most one value, the range is not reduced.
+    If the mimic joints allow at most one value, the range is not reduced.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -178,7 +177,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     # Move each end inwards by the rounding error, so that the mimic joint is within its limits.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # With only one limit, `size` and `error` are infinite.
+    if not math.isfinite(error):  # A mimic joint with only one limit has an infinite `size`.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -193,7 +192,8 @@ def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: `from_pinocchio` allows a deviation from a mimic rule of this number * max(1, largest |value|).
+#: `from_pinocchio` allows this deviation of a mimic joint's values from the mimic rule:
+#:     `_MIMIC_TOLERANCE * max(1, largest absolute value)`
 _MIMIC_TOLERANCE = 1e-9
 
 
@@ -318,7 +318,7 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def named_poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named poses.
 
-    In `ready`, joints without a value are at 0, or mid-range if 0 is outside.
+    In `ready`, a joint without a value is at 0. If 0 is outside its range, the joint is in the middle.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -338,9 +338,8 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value of each locked joint, rad or m.
 
-    A locked joint without a value is at the named pose's value.
-    Without a named pose, the joint is at 0.
-    Only `joints` stay movable; by default, all joints not in `lock`.
+    If `lock` names a joint without a value, the joint is locked at the value of the named pose. The value is
+    0 if `lock` names no pose. If `joints` is given, all other joints are locked.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
@@ -494,8 +493,7 @@ def _degrees_hint(joint: Joint, value: float) -> str:
 
 
 #: Maximum number of configurations in which urdfkin looks for angles in degrees.
-#: A user gives all configurations of a batch in the same unit.
-#: Therefore, a few configurations are enough.
+#: A batch normally has one unit, so a few configurations are enough.
 _MAX_CHECKED = 16
 
 
@@ -614,7 +612,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Random positions of planar and floating joints: -2 to 2 m.
+#: `sample` draws the positions of planar and floating joints from -2 to 2 m.
 _MAX_SAMPLED_POSITION = 2.0
 
 
@@ -687,8 +685,9 @@ def draw_samples(
 ) -> Samples:
     """Draw random samples for a validation.
 
-    A mimic joint may exceed its limits: the equations are also valid there.
-    Quadratic terms dominate the acceleration of every eighth sample (7.129, 7.130).
+    A mimic joint may exceed its limits, because the equations are also valid there.
+    In every eighth sample, large velocities make the quadratic terms of the acceleration dominant (7.129,
+    7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_zero_and_limits:

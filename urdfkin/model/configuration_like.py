@@ -48,10 +48,10 @@ class CoordinateLayout:
 
     Attributes:
         symbol: "q", "v" or "a".
-        units: "rad", "m", "" without unit, or None if unknown.
-        spans: First index and count, for joints with several numbers.
-        hints_by_name: For errors about a joint without a coordinate: hints by the joint's name.
-        hints_by_length: Hints for wrong lengths.
+        units: "rad", "m", "" for a number without a unit, or None for an unknown unit.
+        spans: First index and number of coordinates of each joint that has several coordinates.
+        hints_by_name: Hints in errors about a joint without a coordinate, by the joint's name.
+        hints_by_length: Hints in errors about a wrong length, by the length.
     """
 
     symbol: str
@@ -238,7 +238,7 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
 
 
 def _labels(value: object) -> list[Any]:
-    """The labels 0, 1, 2, ... count as no labels."""
+    """Return a table's labels. The default labels 0, 1, 2, ... are ignored."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []

@@ -46,7 +46,7 @@ class Equation:
         statement: The equation in plain characters.
         definitions: Names of functions in `urdfkin.kinematics.equations` that contain the formula.
         functions: Functions that compute the equation, as "module:name".
-        tests: Tests that detect a wrong computation, as "file::name".
+        tests: Tests that fail if the computation is wrong, as "file::name".
         oracle: Independent source of expected results.
     """
 
@@ -62,7 +62,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One or more sections of the chapter."""
+    """The equations of one or more sections of the chapter."""
 
     number: str
     title: str
@@ -74,7 +74,7 @@ class Misprint:
     """A wrong or incomplete statement in the chapter.
 
     Attributes:
-        test: "file::name" of a test; `printed` fails in this test, and `correct` holds.
+        test: A test, as "file::name". The test shows that `printed` is wrong and `correct` holds.
     """
 
     where: str
@@ -127,7 +127,9 @@ def equations_page() -> str:
         head = "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
         rows = "\n".join(map(_row, section.equations))
         parts += [f"## {section.number} {section.title}", head + rows]
-    introduction = "These statements in the chapter are wrong or incomplete. A test proves each correction."
+    introduction = (
+        "This section lists wrong or incomplete statements of chapter 7. A test proves each correction."
+    )
     return "\n\n".join([*parts, "## Misprints", introduction, *map(_misprint, misprints())]) + "\n"
 
 
@@ -154,8 +156,8 @@ October 2000. Well-known equations are:
 * the forward recursion (7.127 to 7.130).
 
 Tests check this table. Each equation except the {len(lost)} equations on the lost page has a row. Each
-function and each test in the table exists. If a function computes an equation slightly wrong, at least one
-test of the equation fails. If a row states no other frame, vectors are expressed in frame 0."""
+function and each test in the table exists. A small error in a function makes at least one test of the
+equation fail. If a row states no other frame, vectors are expressed in frame 0."""
 
 
 def _row(equation: Equation) -> str:
@@ -184,7 +186,7 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 def explain(number: str) -> str | None:
     """Return the text about an equation.
 
-    `number` is, for example, "7.130" or "(7.130)"; other text gives None.
+    `number` is, for example, "7.130" or "(7.130)". Return None for other text.
     """
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST_EQUATION:
@@ -193,7 +195,7 @@ def explain(number: str) -> str | None:
         return (
             f"Equation {match[1]}\n\nThe chapter's page 2, with equations {', '.join(LOST_PAGE_EQUATIONS)},"
             " is lost."
-            "\nAll remaining equations up to 7.130 are available."
+            "\nAll other equations up to 7.130 are available."
         )
     return _explanation(equations()[match[1]])
 

@@ -61,12 +61,16 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 class JointRule:
     """The conversion of a joint value to another program's value.
 
-    The other program's value is factor * (value in rad or m) + zero, where `factor` includes `sign`.
+    The other program's value is computed from the joint value x (rad or m):
+
+        `factor * x + zero`
+
+    `factor` includes `sign`.
 
     Attributes:
         zero: The other program's value for the joint value 0.
-        unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn.
-            None selects the convention's unit; `factor` is then None.
+        unit: Name of the unit ("rad", "deg", "turn", "m" or "mm"), or the number of units in one turn.
+            None means the convention's unit, and `factor` is None.
     """
 
     name: str | None = None
@@ -95,7 +99,7 @@ class Convention:
     `measurement`, and all attributes from `continuous` to `angle`.
 
     Attributes:
-        joints: Names of the joints in order, if `order` is "given".
+        joints: Names of the joints in order. Only the order "given" uses these names.
         rules: Rules of single joints, by the joint's name in the URDF.
     """
 
@@ -161,7 +165,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse a convention's TOML text.
 
-    `name` is the convention's name and title, unless the text contains them.
+    `name` is the default for the convention's name and title.
     """
     try:
         entries = tomllib.loads(text)
@@ -264,7 +268,7 @@ def as_toml(convention: Convention) -> str:
 
 
 def _quote(text: str) -> str:
-    """Quote as JSON does; TOML also requires an escape for DEL."""
+    """Quote as JSON does. TOML also requires an escape for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -272,9 +276,8 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _BASE_62_DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: An encoded number is a sequence of characters of `_BASE_62_DIGITS`.
-#: The last character has an index in `_BASE_62_DIGITS` below this number.
-#: All other characters have at least this index.
+#: An encoded number consists of digits of base 62.
+#: The last digit is less than this number. All other digits are at least this number.
 _PUNYCODE_THRESHOLD = 31
 
 
@@ -317,16 +320,15 @@ def make_identifier(name: str) -> str:
 def encode_usd_name(name: str) -> str:
     """Transcode a name as `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    An identifier is returned unchanged.
+    An identifier is returned unchanged. Every other name is encoded as "tn__", the kept characters, "_" if
+    any character is kept, and numbers. The kept characters are ASCII letters, digits and "_". Each other
+    character gives the number d n + p in base 62, as in Punycode, in the order of the code points:
 
-        result:   "tn__" + kept characters + "_" if any character is kept + numbers
-        kept:     letters, digits and "_" (ASCII)
-        numbers:  d n + p in base 62 for each other character, as in Punycode,
-                  in the order of the code points
-
-        d:   code point minus the previous code point (at first 0)
-        n:   number of possible positions
-        p:   position among the characters that are already encoded
+    | Symbol | Meaning |
+    |---|---|
+    | d | code point minus the previous code point (at first 0) |
+    | n | number of possible positions |
+    | p | position among the characters that are already encoded |
 
     Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 

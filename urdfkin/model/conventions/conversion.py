@@ -1,9 +1,14 @@
 """Convert q, v, a, Jacobians and six-vectors of a robot between urdfkin and another program.
 
-Let M be the matrix `Conversion.matrix`, and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v,
-and J_tool = S J M^-1. S exchanges the linear and the angular rows if the target program has the angular rows
-first. If the target program and urdfkin use different axes for the velocity of a floating or planar joint, M
-depends on q. In all other cases, M is constant.
+The target program has these joint velocities, joint accelerations and Jacobians:
+
+    `v_tool = M v`
+    `a_tool = M a + M' v`
+    `J_tool = S J M^-1`
+
+M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
+rows if the target program has the angular rows first. M depends on q only if the target program and urdfkin
+use different axes for the velocity of a floating or planar joint.
 """
 
 from __future__ import annotations
@@ -25,7 +30,9 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Allowed deviation from a mimic rule: this number * max(1, |`_TargetNumber.factor`|), in the target's unit.
+#: Allowed deviation from a mimic rule, in the target program's unit:
+#:     `_MIMIC_TOLERANCE * max(1, |factor|)`
+#: `factor` is an attribute of `_TargetNumber`.
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -34,8 +41,11 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """One coordinate or one joint velocity of the target program.
 
-    The value is y = factor * x[index] + zero, where x is urdfkin's q or v.
-    If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y).
+    With urdfkin's q or v as x, the value is:
+
+        `y = factor * x[index] + zero`
+
+    If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y) instead.
     """
 
     name: str
@@ -72,7 +82,8 @@ class Conversion:
         tree: The robot.
         urdf: The robot's URDF text.
         convention: The convention.
-        joints: Order of the joints, instead of the convention's; required if the convention has none.
+        joints: Order of the joints, which replaces the convention's order. `joints` is required if the
+            convention has no order.
 
     Raises:
         InputError: The order is wrong, two joints get the same name, or a rule does not fit its joint.
@@ -162,7 +173,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The URDF text does not contain a root joint that urdfkin added. The rank -1 puts this joint first.
+        # A root joint that urdfkin added is not in the URDF text. The rank -1 sorts the root joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -186,7 +197,7 @@ class Conversion:
     ) -> list[int]:
         """Sort siblings by `keys`.
 
-        If `merge_fixed` is true, links that a fixed joint connects count as one link.
+        If `merge_fixed` is true, two links with a fixed joint between them count as one link.
         """
 
         def below(link: int) -> list[int]:
@@ -287,7 +298,7 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) in the link's frame, m; 0 without an inertial origin."""
+        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none."""
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -312,7 +323,7 @@ class Conversion:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether the target program's q contains cosines and sines."""
+        """True if the target program's q contains cosines and sines."""
         return any(column.cos_or_sin for column in self._columns)
 
     @property
@@ -342,13 +353,13 @@ class Conversion:
     def permutation(self) -> NDArray[np.intp] | None:
         """Indices with which `q[..., permutation]` is the target program's q.
 
-        None if the conversion also changes values.
+        The property is None if the conversion also changes values.
         """
         return self._q_index.copy() if self._plain_q else None
 
     @property
     def is_constant(self) -> bool:
-        """Whether `matrix` is independent of q."""
+        """True if `matrix` does not depend on q."""
         how = self.convention
         return not any(
             block.joint.kind is JointKind.PLANAR or "parent" in (how.linear, how.angular)
@@ -359,7 +370,7 @@ class Conversion:
     def velocity_permutation(self) -> NDArray[np.intp] | None:
         """Indices with which `v[..., velocity_permutation]` is the target program's v.
 
-        None if the conversion also changes values.
+        The property is None if the conversion also changes values.
         """
         return self._v_index.copy() if self._plain_v else None
 
@@ -505,7 +516,7 @@ class Conversion:
     def _to_target_rates(
         self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M x + M' v for x = `own_rates`; return M x if `v` is None."""
+        """Return M x + M' v for x = `own_rates`, or M x if `v` is None."""
         if self._same_v:
             return own_rates
         rates: FloatArray = own_rates[..., self._v_index]
@@ -524,7 +535,7 @@ class Conversion:
     def _from_target_rates(
         self, q: FloatArray, target_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M^-1 (x - M' v), or M^-1 x without v; x is `target_rates`."""
+        """Return M^-1 (x - M' v) for x = `target_rates`, or M^-1 x if `v` is None."""
         if self._same_v:
             return target_rates
         rates: FloatArray = target_rates[..., self._v_target_index]
@@ -548,7 +559,7 @@ class Conversion:
             (..., program's nv, nv) matrix.
 
         Raises:
-            InputError: M depends on q, and q is None.
+            InputError: q is None, but M depends on q.
         """
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
@@ -587,7 +598,7 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 with v = M^-1 v_tool.
 
-        In M^-1, the column of a mimic joint is 0 if v_tool contains the mimicked joint.
+        If v_tool contains a mimic joint and its mimicked joint, the mimic joint's column in M^-1 is 0.
 
         Returns:
             (..., nv, program's nv) matrix.
@@ -604,9 +615,9 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the joint's part of `matrix`: (..., 3, 3) if planar, (..., 6, 6) if floating.
+        """Return the joint's part of `matrix`, (..., 3, 3) for a planar or (..., 6, 6) for a floating joint.
 
-        `q` is the robot's q. With the joint's own velocity v, return the part's time derivative instead.
+        `q` is the robot's q. If the joint's velocity v is given, return the part's time derivative.
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -654,7 +665,7 @@ class Conversion:
         return self.columns(q, self.reorder_six_vector(J, -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the columns of a matrix J to the target program: J M^-1.
+        """Convert the columns of a matrix J to the target program, as J M^-1.
 
         Each row of J must have the same meaning in both conventions.
 
@@ -686,7 +697,10 @@ class Conversion:
     def jacobian_rate(
         self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
     ) -> FloatArray:
-        """Convert the time derivative J' of a Jacobian J to S (J' M^-1 + J (M^-1)')."""
+        """Convert the time derivative J' of urdfkin's Jacobian J to the target program.
+
+        The result is `S (J' M^-1 + J (M^-1)')`.
+        """
         converted = self.jacobian(q, rate)
         if self.is_constant:
             return converted
@@ -696,12 +710,12 @@ class Conversion:
         return converted + array @ _add_frame_axis(change, array.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
-        """Convert a kinematic Hessian to the target program.
+        """Convert urdfkin's kinematic Hessian to the target program's Hessian.
 
         Args:
             q: Configuration.
             J: (..., 6, nv) Jacobian.
-            H: (..., 6, nv, nv) derivatives of J by the coordinates.
+            H: (..., 6, nv, nv) derivatives of J with respect to the joint motions.
         """
         self._refuse_mimic_columns()
         inverse, tensor, columns = (
@@ -730,10 +744,10 @@ class Conversion:
         """Convert a result to the target program's rows and columns.
 
         Args:
-            quantity: For example "velocity".
-            inputs: q, v and a in urdfkin's convention, as far as the quantity needs them.
+            quantity: Name of the quantity, for example "velocity".
+            inputs: The inputs of the quantity (q, v and a), in urdfkin's convention.
             result: The quantity in urdfkin's convention.
-            jacobian: Returns the Jacobian; called only for "jacobian rate" and "hessian".
+            jacobian: Computes the Jacobian, which only "jacobian rate" and "hessian" need.
 
         Raises:
             InputError: No convention defines the quantity.
@@ -770,7 +784,10 @@ class Conversion:
 
 @dataclass(frozen=True, slots=True)
 class Reordering:
-    """The conversion of a vector x to x[..., index] * factor + zero."""
+    """The conversion of q or v from one convention to another.
+
+    A vector x is converted to `x[..., index] * factor + zero`.
+    """
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
@@ -792,12 +809,9 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Find the index, factor and zero that convert "q" or "v" between two conventions.
+    """Return the reordering that converts "q" or "v" from one convention to another, or None.
 
     A `Reordering` cannot convert angles to cosines, or change a velocity's frame.
-
-    Returns:
-        None if no reordering exists.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -847,9 +861,9 @@ def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int
 
 
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Return indices k for which x_tool[..., k] has the order of urdfkin's q or v.
+    """Return the indices that reorder the target program's q or v as urdfkin's q or v.
 
-    The index of a mimic joint is used only if the mimicked joint has no coordinate in the target program.
+    If the target program has no coordinate for a mimicked joint, its mimic joint's index is used.
     """
     return [
         min(
