@@ -316,7 +316,7 @@ class OpwParameters:
 
         F is the solver's forward kinematics, and the pose is:
 
-            `base F(sign * q - offset) tool`
+        `base F(sign * q - offset) tool`
         """
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()

@@ -132,7 +132,7 @@ class DHRow:
 
         The distance is 0 except in a Hayati row. With the angle `tilt` between the two joint axes, it is:
 
-            `|a sin(beta)| / sin^2(tilt)`
+        `|a sin(beta)| / sin^2(tilt)`
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].distance_to_normal
@@ -285,7 +285,7 @@ class SnapReport:
 
     Each change rotates the rest of the chain about a joint's origin, and moves the tip by at most:
 
-        `angle * distance from the joint's origin to the tip`
+    `angle * distance from the joint's origin to the tip`
 
     Attributes:
         tolerance: The requested tolerance (rad).
@@ -506,7 +506,7 @@ class DHTable(Displayable):
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 
-            `eps * (8 (n + 1) + sum of |angles|) * length`
+        `eps * (8 (n + 1) + sum of |angles|) * length`
 
         The angles are the values of the revolute joints. The length is the sum of `span`, the absolute values
         of the prismatic joints, and the length of the base's translation. The bound divided by `span` bounds

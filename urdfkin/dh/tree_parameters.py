@@ -5,7 +5,7 @@ link j has one frame. The axis z_j of the frame is the axis of joint j, which mo
 link j is the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this
 pose in frame i:
 
-    `T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r)`
+`T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r)`
 
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
 child of link i. Therefore, gamma and b of the first moving child are zero. For a chain without branches, the

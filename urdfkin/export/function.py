@@ -13,8 +13,8 @@ All other expressions are parts of larger expressions.
 constant of the code has the value x_i with the rounding error e_i (`urdfkin.kinematics.roundings`). A result
 y has this error and this bound:
 
-    `error = sum of e_i dy/dx_i`
-    `bound = sum of |e_i dy/dx_i|`
+`error = sum of e_i dy/dx_i`
+`bound = sum of |e_i dy/dx_i|`
 
 A backward pass over the operations computes the derivatives.
 """

@@ -265,7 +265,7 @@ def _rotation_rate_bound(plan: CompiledTree) -> float:
     the rotation angle has the first three derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third derivative
     of a product of F rotated unit vectors is at most:
 
-        `(2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3`
+    `(2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3`
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(sum_multipliers(plan)[0].max(initial=0.0)))

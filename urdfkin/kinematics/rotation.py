@@ -105,7 +105,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
     The result is one Newton step (Bjorck and Bowie):
 
-        `M - M (M^T M - I)/2`
+    `M - M (M^T M - I)/2`
 
     With M = U (I + E), the result is U (I - 3/2 E^2). Since |E| <= 3e-9, the error is at most 3/2 |E|^2,
     about 1.4e-17. This is an eighth of eps/2 = 1.1e-16.
@@ -570,13 +570,13 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGUL
     F is the rotation by the first angle, and w' = F^T w. The rates r_1, r_2 and r_3 of the three angles
     satisfy:
 
-        `w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)`
+    `w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)`
 
     The three components of this equation give the rates:
 
-        `r_3 = w'_other / across`
-        `r_2 = w'_second`
-        `r_1 = w'_first - along r_3`
+    `r_3 = w'_other / across`
+    `r_2 = w'_second`
+    `r_1 = w'_first - along r_3`
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
@@ -617,7 +617,7 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     The angle d is the angle between the lines of the first and the third rotation axis, from 0 to pi/2. The
     second axis is perpendicular to both. Therefore, Omega has these singular values:
 
-        `1, sqrt(1 + cos d), sqrt(1 - cos d)`
+    `1, sqrt(1 + cos d), sqrt(1 - cos d)`
 
     At the singularity, d is 0, and the function raises RepresentationSingularityError.
     """

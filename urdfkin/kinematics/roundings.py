@@ -2,7 +2,7 @@
 
 All tolerances of urdfkin use these bounds:
 
-    `tolerance = count * eps * scale`
+`tolerance = count * eps * scale`
 
 The number eps is 2^-52. The error of one operation is at most eps/2 times the rounded number. The scale is an
 upper bound on the sum of the absolute values of the result's terms. This module defines the counts, to first
@@ -66,7 +66,7 @@ Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate 
 file's axis to the coordinate axis. The angle t of Q is the tilt. The replacement changes the joint's rotation
 R by at most 2 t:
 
-    `|Q R Q^T - R| <= 2 |Q - 1| <= 2 t`
+`|Q R Q^T - R| <= 2 |Q - 1| <= 2 t`
 
 Therefore, a rotated vector and a translation along the axis have an error of at most 2 t. For all frames
 after the joint, each factor has the additional error 2 t, which is 2 t / eps in eps. If t > eps, urdfkin
@@ -118,7 +118,7 @@ The errors of an export and of urdfkin have the same standard deviation.
 **Single precision.** `urdfkin.export.function` computes a bound for each number of a test vector. Each
 operation and each constant has a value x. The bound is the sum of these products over all x:
 
-    `(rounding error of x) * |derivative of the result with respect to x|`
+`(rounding error of x) * |derivative of the result with respect to x|`
 
 With eps = 2^-23, the error of one operation is
 
@@ -195,7 +195,7 @@ The counts, with u = eps/2, are
 
 **MJCF equalities.** The tree's mimic rules satisfy an equality in an MJCF file up to rounding:
 
-    `y - y0 = c0 + c1 (x - x0)`
+`y - y0 = c0 + c1 (x - x0)`
 
 The numbers x and y are the values of two joints. The numbers x0 and y0 are reference values.
 
@@ -209,13 +209,13 @@ The numbers x and y are the values of two joints. The numbers x0 and y0 are refe
 
 With k mimic rules between the mimic joint and the independent joint, the tolerance is:
 
-    `MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)`
+`MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)`
 
 **Numbers near zero.** A product below the smallest normal number n loses bits. The smallest subnormal number
 is eps n = 2^-1074, so the error of the product is at most 2^-1075. Every nonzero scale is at least n
 (`urdfkin.kinematics.number_kinds`). Therefore, the tolerance is larger than this error:
 
-    `count * eps * scale >= count * eps n > 2^-1075`
+`count * eps * scale >= count * eps n > 2^-1075`
 
 A later product with a large number multiplies the error and the scale by the same factor.
 
@@ -339,7 +339,7 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference (eps) between urdfkin and Pinocchio for a term with one factor.
 
-        `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
+    `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 
     `joints` is usually the number that `PINOCCHIO_ROUNDINGS` defines. `tilt` is the sum of the tilts (rad) of
     the path's joints.

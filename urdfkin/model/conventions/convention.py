@@ -63,7 +63,7 @@ class JointRule:
 
     The other program's value is computed from the joint value x (rad or m):
 
-        `factor * x + zero`
+    `factor * x + zero`
 
     `factor` includes `sign`.
 

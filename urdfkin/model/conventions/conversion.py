@@ -2,9 +2,9 @@
 
 The target program has these joint velocities, joint accelerations and Jacobians:
 
-    `v_tool = M v`
-    `a_tool = M a + M' v`
-    `J_tool = S J M^-1`
+`v_tool = M v`
+`a_tool = M a + M' v`
+`J_tool = S J M^-1`
 
 M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
 rows if the target program has the angular rows first. M depends on q only if the target program and urdfkin
@@ -43,7 +43,7 @@ class _TargetNumber:
 
     With urdfkin's q or v as x, the value is:
 
-        `y = factor * x[index] + zero`
+    `y = factor * x[index] + zero`
 
     If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y) instead.
     """
