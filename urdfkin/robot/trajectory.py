@@ -741,8 +741,9 @@ def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterato
         moved = rule.multiplier * (new[:, at] - q[:, at])
         if joint.kind.turns:
             moved = np.remainder(moved + math.pi, math.tau) - math.pi
-        if np.abs(moved).max() > _MIMIC_ROUNDING * max(1.0, abs(rule.multiplier)):
-            k = int(np.flatnonzero(np.abs(moved) > _MIMIC_ROUNDING)[0])
+        changed = np.abs(moved) > _MIMIC_ROUNDING * max(1.0, abs(rule.multiplier))
+        if changed.any():
+            k = int(np.flatnonzero(changed)[0])
             yield (
                 f"joint {joint.name} mimics {rule.mimicked_joint} with multiplier {rule.multiplier:g};"
                 f" unwrapping {rule.mimicked_joint} changes the value of {joint.name}, at sample {k} from"
