@@ -435,7 +435,7 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 class NumberReader:
     """Read numbers from attributes, and report mistakes.
 
-    `bad_number` is the rule about an invalid number. `bad_vector` is the rule about a wrong count of numbers.
+    The rule `bad_number` reports an invalid number. The rule `bad_vector` reports a wrong count of numbers.
     `effect` is appended to the messages of both rules.
     """
 

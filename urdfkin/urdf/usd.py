@@ -94,7 +94,7 @@ _SHAPE_XFORM_NAMES = ("visual", "visuals", "collision", "collisions")
 #: Rotation of the y axis onto the z axis.
 _ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: Kinds of remarks. The module `lint.rules.left_out` defines a rule for each kind.
+#: Kinds of remarks. Each kind has a rule in the module `lint.rules.left_out`.
 RemarkKind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -159,7 +159,7 @@ class Usd:
             3. the sum of the lengths (m) of the vectors that the orientation errors rotate,
             4. a bound on the relative error of a mimic joint's value, or 0 for other joints,
             5. the distance (m) between the joint frame and the child frame.
-        joints: The values of each joint prim in the tree, by the path of the prim.
+        joints: The joint prims in the tree. The keys are the paths of the prims.
         meters_per_unit: The stage's metersPerUnit.
     """
 
@@ -407,7 +407,7 @@ class _StageReader:
     _edges: list[_JointPrim] = field(default_factory=list)
     _joints_read: dict[str, UsdJoint] = field(default_factory=dict)
     _single_rounding_terms: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # Pinocchio names the world `universe`, and a moving base's joint `root_joint`.
+    # Pinocchio itself uses the names `universe` and `root_joint`.
     _used_link_names: set[str] = field(default_factory=lambda: {"universe"})
     _used_joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _meters_per_unit: float = 1.0
@@ -647,8 +647,8 @@ class _StageReader:
             length_A + length_B,
             (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
         )
-        # A and B are poses in a body, or in a world with z up.
-        # `UsdJoint` contains poses in a body, or in the stage's world, in which y may be up.
+        # Without a body, A or B is a pose in a world with z up.
+        # Without a body, the pose in `UsdJoint` is a pose in the stage's world, where y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             directions, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),

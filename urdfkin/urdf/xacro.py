@@ -130,9 +130,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, timeout: float = EXPANSI
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="set arguments with --xacro-arg NAME:=VALUE; if VALUE is the path of a file or folder, the"
-        " xacro file may read this path; set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists"
-        " the operations that a xacro file may do",
+        remedy="set arguments with --xacro-arg NAME:=VALUE, and the folders of packages in ROS_PACKAGE_PATH;"
+        " the xacro file may read a file or folder if its path is the VALUE of an argument; docs/xacro.md"
+        " lists the allowed operations",
         question=QuestionsSection.XACRO,
     )
 

@@ -54,8 +54,8 @@ from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compu
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
 #: Representations of the orientation in each row of a study's table for analytical Jacobians.
-#: The study omits angles about fixed axes: their Jacobian has the same rows as a Jacobian of Euler angles,
-#: with the angles in reverse order.
+#: Angles about fixed axes are omitted, because they are Euler angles in the reverse order.
+#: The Jacobian has the same rows in the reverse order.
 _ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -221,9 +221,9 @@ class _AccuracyBatch:
 
 
 def _find_nonzero_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return indices (n, links, m) of columns: first a link's nonzero columns, then zero columns.
+    """Return the indices (n, links, m) of the nonzero columns for each sample and link.
 
-    m is the largest number of nonzero columns of any sample and link.
+    m is the largest number of nonzero columns. Indices of zero columns fill shorter rows.
     """
     is_zero = ~(scale > 0.0).any(axis=-2)
     width = int((~is_zero).sum(axis=-1).max(initial=0))

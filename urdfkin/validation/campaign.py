@@ -101,9 +101,9 @@ def validate(
         progress: Callback, called before the work and after each chunk.
 
     Returns:
-        The report on every requested robot; with `shard`, on every robot with chunks in the shard. A robot
-        that cannot be read or checked is reported with its error. An interrupt ends the run; finished results
-        stay in the report.
+        The report on all robots. With `shard`, the report contains only robots with chunks in the shard. A
+        robot that cannot be read or checked is reported with its error. After an interrupt, the report
+        contains the finished results.
 
     Raises:
         InputError: An argument is invalid, for example `samples` < 0, `jobs` < 1, or `shard` without `store`.

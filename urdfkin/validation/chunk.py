@@ -250,7 +250,7 @@ class _FrameComparison(_Comparison):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches a compiled tree for all frames. A compiled tree for some frames is not cached.
+        # The robot caches only the compiled tree for all frames.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.magnitudes = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)

@@ -266,7 +266,8 @@ class Mistakes:
         """Return the independent joints with one coordinate.
 
         Returns:
-            (name, index in q, index in v, is_angle) of each joint, in the function's convention.
+            A tuple (name, index in q, index in v, is_angle) for each joint. The indices are those of the
+            function's convention.
         """
         tree = self.robot.tree
         joints = []

@@ -23,7 +23,7 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_NULL_MEANING = "null: a result is NaN, or two values with the bound 0 differ."
+_NULL_MEANING = "null: infinite, for example because a result is NaN."
 Units = Annotated[
     NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
 ]
@@ -141,7 +141,7 @@ class ReportedFinding(TypedDict):
         doc("Severity of the finding. A file with an error is not compared with Pinocchio."),
     ]
     message: Annotated[str, doc("Description of the problem.")]
-    found: Annotated[str | None, doc("What was found, usually the wrong text in the file; null: none.")]
+    found: Annotated[str | None, doc("The text or value that caused the finding; null: none.")]
     remedy: Annotated[str | None, doc("How to correct the file; null: no remedy is known.")]
     file: Annotated[str, doc("Name of the file with the problem.")]
     line: Annotated[Count, doc("Line number of the problem, counted from 1.")]
@@ -204,24 +204,21 @@ class Chain(TypedDict):
     tip: Annotated[str, doc("Name of the chain's tip frame.")]
     standard: ReportedDHTable
     modified: ReportedDHTable
-    samples: Annotated[Count, doc("Number of compared configurations; 0: no comparison.")]
+    samples: Annotated[Count, doc("Number of compared configurations.")]
     metres: Annotated[
         float | None,
-        doc("Largest distance (metres) between a table's tip and Pinocchio's tip; null: no comparison."),
+        doc("Largest distance (metres) of a table's tip from Pinocchio's tip. null: nothing was compared."),
     ]
     worst: Annotated[
         Units,
         doc(
             "Largest disagreement of the tip's placement, Jacobian and acceleration of both tables, in eps"
-            " * scale. null: a result is NaN, two values with the bound 0 differ, or there is no comparison."
+            " * scale. null: infinite, or nothing was compared."
         ),
     ]
     bound_ratio: Annotated[
         float | None,
-        doc(
-            "Largest ratio of a disagreement to its bound. null: a result is NaN, two values with the bound"
-            " 0 differ, or there is no comparison."
-        ),
+        doc("Largest ratio of a disagreement to its bound. null: infinite, or nothing was compared."),
     ]
 
 
@@ -267,8 +264,8 @@ class Case(TypedDict):
     frame: Annotated[
         str,
         doc(
-            "Name of the frame (link:NAME or joint:NAME). If `subjects` is `joints` or `columns`: name of the"
-            " joint."
+            "Name of the frame (link:NAME or joint:NAME). It is the name of a joint if `subjects` is `joints`"
+            " or `columns`."
         ),
     ]
     disagreement: Units

@@ -29,7 +29,7 @@ CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
 
 @dataclass(frozen=True, slots=True)
 class OraclePair:
-    """Comparison of one library with the second oracle.
+    """Comparison of urdfkin or Pinocchio with the second oracle.
 
     Attributes:
         worst: Largest disagreement, in eps * scale.

@@ -108,11 +108,11 @@ class FunctionCheck(Displayable):
         eps_scale: Largest difference in multiples of eps * scale.
         bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference
             bound * factor. The ratio is at most 1 if all results agree.
-        oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of bound * factor. None
-            without an oracle.
-        rows: The dictionary {name of the row: `bound_ratio` of the row}, for example {"vx": 0.2}.
-        columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for a
-            result without such columns, for example a placement.
+        oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of the allowed
+            difference. None without an oracle.
+        rows: The `bound_ratio` of each row, for example {"vx": 0.2}.
+        columns: The `bound_ratio` of each column of a Jacobian. The keys are names of joint velocities. Empty
+            for a result without such columns, for example a placement.
         worst: The worst result; None if no result was compared, or if the results contain no numbers (a
             Jacobian of a robot without moving joints).
         errors: Number of configurations with an exception, or without real numbers in the right shape.
@@ -284,8 +284,8 @@ def verify_function(
             for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
             errors. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared
             results agree with urdfkin's.
-        batch: If True, the function computes n configurations in one call, and returns n results. The shapes
-            of the inputs are then (n, nq) for q, and (n, nv) for v and a.
+        batch: If True, the function computes n configurations in one call, and returns n results. The
+            function receives q (n, nq), v (n, nv) and a (n, nv).
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
 
@@ -343,7 +343,9 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """Results for a batch of configurations, of which n have a valid result of the user's function.
+    """Results for a batch of configurations.
+
+    The user's function returned a valid result for n of these configurations.
 
     Attributes:
         first: Index of the batch's first configuration in the whole check.

@@ -45,9 +45,9 @@ def frame_array_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, item_bytes: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `MAX_BLOCK_BYTES`, or of one item.
+    """Divide `count` items into slices of at most `MAX_BLOCK_BYTES`.
 
-    For zero items, yield one empty slice.
+    A larger item gets its own slice. For zero items, yield one empty slice.
     """
     items = max(1, MAX_BLOCK_BYTES // item_bytes)
     for start in range(0, max(1, count), items):
@@ -79,7 +79,7 @@ def check(tree: KinematicTree, samples: int, allowed_bytes: int | None) -> None:
 
 
 def _find_free_bytes() -> Iterator[int]:
-    """Yield the free memory (bytes) of the machine, of each control group, and below the limit RLIMIT_AS."""
+    """Yield the free memory (bytes) under each limit: of the machine, of a control group, RLIMIT_AS."""
     for line in _read_lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 #: Packages that display results, but compute no results.
-#: A campaign can resume after a change of these packages.
+#: A campaign can resume if only the code of these packages has changed.
 _DISPLAY_PACKAGES = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 

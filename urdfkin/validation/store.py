@@ -15,9 +15,8 @@ the sha256 of all data on which the chunk's numbers depend. Therefore, results o
 are never reused.
 
 Files are written atomically, so a file is either complete or absent. A file's name contains the key of its
-chunk. The store reports damaged files, and files that belong to no chunk of the validation. A store that is
-open for writing also moves the reported files to the folder `damaged/`. The results in a damaged file are
-computed again.
+chunk. The store reports damaged files, and files that belong to no chunk of the validation. A writable store
+moves these files to the folder `damaged/`. The results in a damaged file are computed again.
 """
 
 from __future__ import annotations
