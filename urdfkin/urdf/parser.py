@@ -1,9 +1,9 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-The XML parser is expat, which reports the position of every start tag, keeps namespace prefixes, parses deep
-nesting without recursion, and opens no file. If a document type declaration has brackets or refers to an
-external file, parsing stops with an error. Therefore, only the entities of XML itself are expanded, for
-example `&amp;`.
+The XML parser is expat. expat reports the position of every start tag, and parses deep nesting without
+recursion. It keeps namespace prefixes, and opens no file. If a document type declaration has brackets or
+refers to an external file, parsing stops with an error. Therefore, only the entities of XML itself are
+expanded, for example `&amp;`.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
 finding.
@@ -398,7 +398,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: Pairs (message, remedy or None) for each message of expat.
+#: A message and a remedy (or None) for each error of expat.
 _TEXTS_BY_EXPAT_ERROR: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -546,7 +546,7 @@ class NumberReader:
         )
 
 
-#: Messages about invalid numbers in these elements name the attribute, but not the tag.
+#: Tags that messages about invalid numbers omit. The messages contain the attribute's name.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
@@ -780,7 +780,7 @@ class JointReader:
         axis = joint.axis_element = joint.element.find("axis")
         if axis is None:
             return
-        if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
+        if joint.kind in ("fixed", "floating"):
             effect = f"; a {joint.kind} joint ignores its axis"
             NumberReader(self.report, IGNORED_VALUE, IGNORED_VALUE, effect).read_vector(axis, "xyz")
             return
@@ -789,7 +789,7 @@ class JointReader:
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
             return  # Rule URDF212 reports text between tags.
-        message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
+        message = "some readers read <axis> without xyz as 1 0 0; urdfdom reads 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
         # A planar joint moves in the XY plane of its frame, independent of the axis.
         severity = Severity.WARNING if joint.kind == "planar" else None

@@ -235,11 +235,11 @@ def _take_columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations, with q . near > 0.
+    """Return the unit quaternions (m, 4) of rotations.
 
     Args:
         R: (m, 3, 3) rotations.
-        near: (m, 4) quaternions.
+        near: (m, 4) quaternions. They determine the signs of the returned quaternions q: q . near > 0.
     """
     K = davenport_matrix(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.

@@ -152,7 +152,7 @@ def validate(
             if stored_answers is not None:
                 campaign.load_answers(stored_answers)
             for i, error in read_errors.items():
-                # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
+                # After the first failure of a robot, `missing_chunks` yields no further chunk of the robot.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.make_task(i, index), make_failure(robot_inputs[i], error))
             unfinished_inputs = [

@@ -121,7 +121,7 @@ class Timings:
 class ChunkResult:
     """Result of one chunk, or the sum of several results.
 
-    `summary` is None without the first chunk of the robot.
+    `summary` is None if the robot's first chunk is not included.
     """
 
     name: str

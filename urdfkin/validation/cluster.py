@@ -39,15 +39,14 @@ from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
 #: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * (threads of all workers) + _EXTRA_CHUNKS.
-#: Every thread then always has a next chunk.
+#: With this number of chunks, every thread has a next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe: a chunk can crash a child process of a Dask worker, but not the Dask worker.
 _MAX_TRIES = 20
 #: Seconds after which the number of workers is read again.
 _REFRESH_SECONDS = 1.0
-#: The scheduler does not need these packages.
-#: If the scheduler has one of the packages, its version must be the same as in this process.
+#: Packages that must have the same version as in this process. A scheduler may lack these packages.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _EMPTY_ROBOT_INPUT = RobotInput(b"", Origin(""))
 
@@ -66,8 +65,8 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
         tell: Function that receives messages for the user.
 
     Raises:
-        ClusterError: No scheduler answers, a worker cannot run urdfkin, or versions or code differ. Dask
-            opens a port for local workers.
+        ClusterError: No scheduler answers. A worker cannot run urdfkin, or has another version or other code.
+            Dask opens a port for local workers.
         InputError: N in `local:N` is not a whole number, or is below one.
     """
     with _connect_client(scheduler) as client:
@@ -96,8 +95,7 @@ def _connect_client(scheduler: str) -> Iterator[Client]:
             with client:
                 yield client
             return
-        # Delete the failed client in the thread that created the client.
-        # If another thread deleted the client, Dask would hang.
+        # Delete the client in this thread. Dask hangs if another thread deletes the client.
         gc.collect()
         key_hint = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(

@@ -159,7 +159,7 @@ class _RobotAnswers:
 
     def make_report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
         # The report contains only results of chunks before the first failed chunk.
-        # The speed of the workers determines which later chunks are finished.
+        # Otherwise, the report would depend on the speed of the workers.
         last = min(self.failures, default=self.chunks.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -35,7 +35,7 @@ EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
 #: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: A difference is divided by its scale, or by _MIN_SCALE * (largest scale) if this number is larger.
+#: A difference is divided by its scale. A scale is raised to at least _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
@@ -120,8 +120,8 @@ def diagnose(mistakes: Mistakes, case: DiagnosisCase) -> list[str]:
     return []
 
 
-#: A common mistake: (sentence that describes the mistake, function without arguments).
-#: The function returns urdfkin's results with the mistake.
+#: A sentence that describes a common mistake, and a function.
+#: The function returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -286,9 +286,9 @@ class Mistakes:
     def _scale_joints(
         inputs: Inputs, indices: Sequence[tuple[int, int]], factor: float, count: int
     ) -> Inputs:
-        """Multiply some joints' entries in the first `count` of q, v and a by `factor`.
+        """Multiply the entries of some joints by `factor` in the first `count` of the inputs q, v and a.
 
-        `indices` contains (index in q, index in v and a) of each joint.
+        For each joint, `indices` contains its index in q, and its index in v and a.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):
@@ -430,7 +430,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _find_column_mistakes(mistakes: Mistakes, case: DiagnosisCase) -> Iterator[tuple[float, str]]:
-    """Yield (remainder, sentence) for each column with a simple mistake; the remainder is 0."""
+    """Yield the remainder 0 and a sentence for each column with a simple mistake."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

@@ -259,7 +259,11 @@ class Case(TypedDict):
     """The sample with the largest ratio of a disagreement to its bound."""
 
     sample: Annotated[
-        Count, doc("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
+        Count,
+        doc(
+            "Index of the sample. 0: the neutral configuration. 1: the lower limits. 2: the upper limits."
+            " Above 2: random configurations."
+        ),
     ]
     frame: Annotated[
         str,
@@ -418,7 +422,7 @@ class ReportedRobot(TypedDict):
         list[ReportedCheck], doc("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
     accuracy: Annotated[
-        ReportedAccuracy | None, doc("Result of the accuracy study; null without `--accuracy` or a result.")
+        ReportedAccuracy | None, doc("Result of the accuracy study; null if there is no result.")
     ]
 
 
@@ -433,8 +437,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds, without compilation before the first chunk. In a report"
-            " that `urdfkin report DIR` makes from a store: the sum of the robots' computing times."
+            "Wall time of the validation in seconds, without compilation before the first chunk. If `urdfkin"
+            " report DIR` makes the report from a store, the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]
@@ -454,7 +458,7 @@ class Document(Header):
 class ValidationVerdict(StrEnum):
     """Verdict on one robot.
 
-    HTML and Markdown reports list robots in the order of these members.
+    HTML and Markdown reports sort the robots by verdict, bad input first.
     """
 
     BAD_INPUT = "bad input"

@@ -6,8 +6,7 @@ matter: the collector sorts the answers, so no result depends on the engine. If 
 Tasks are created only when they are needed, so a million tasks take little memory.
 
 `WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker.
-If no robot is waiting, a free worker takes chunks of the least advanced robot: the index of its latest chunk
-is the lowest.
+If no robot is waiting, a free worker takes a chunk of the robot whose latest chunk has the lowest index.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks that are submitted to the executor and whose answers are not taken yet.
+#: Maximum number of submitted chunks without a processed answer.
 MAX_IN_FLIGHT = 512
 
 

@@ -1,8 +1,8 @@
 """Error statistics of a validation.
 
 The statistics of several chunks, processes and machines can be added. The addition is commutative and
-associative. Therefore, the sum does not depend on the division of the samples into chunks. The sum of two
-statistics contains the worse of the two worst cases.
+associative. Therefore, the sum does not depend on the division of the samples into chunks. The worst case of
+a sum is the worst case of its terms.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.

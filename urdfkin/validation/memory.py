@@ -4,10 +4,9 @@ Frames are compared in blocks, to limit the memory. The largest arrays are the J
 samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
 results do not depend on the other frames.
 
-The `jobs` local processes together use at most half of the memory that is free at the start, in equal parts.
-A process of an executor uses at most half of the memory that is free on its machine. If a robot needs more
-memory than one process may use, the robot is not verified. The report then states the needed and the allowed
-memory.
+Local processes share half of the memory that is free at the start in equal parts. A process of an executor
+uses at most half of the free memory of its machine. If a robot needs more memory than one process may use,
+the robot is not verified. Its report states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ from urdfkin.model.tree import KinematicTree
 MAX_BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FREE_FRACTION = 0.5
-#: Measured: Pinocchio 4.1.0 needs _BYTES_PER_NV_CUBED * nv^3 bytes for its workspace, and
-#: _BYTES_PER_LINK bytes for each link.
+#: Measured memory of Pinocchio 4.1.0. Its workspace is proportional to nv^3.
 _BYTES_PER_NV_CUBED, _BYTES_PER_LINK = 64, 24_000
 #: Maximum number of arrays in memory at the same time; each contains the results of a block of frames.
 _MAX_ARRAYS = 12

@@ -21,7 +21,7 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run` for a chunk: a word and data.
+#: Return value of `run`: the outcome of a chunk, and data.
 #: "answer": The data are the pickled answer of the chunk.
 #: "died": The chunk crashed two processes.
 #: The data are a text with the signal or exit status of the second crash.

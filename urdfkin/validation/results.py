@@ -233,7 +233,7 @@ class ValidationReport(Displayable):
 
     @property
     def passed(self) -> bool:
-        """Whether every requested robot was verified without interruption; False without a robot."""
+        """Whether every requested robot was verified without interruption. False if there is no robot."""
         return self.outcome.passed
 
     @property

@@ -219,8 +219,8 @@ class Store:
     def check_names(self) -> None:
         """Report files with unknown names; a writable store moves them to `damaged/`.
 
-        Results of the accuracy study are not reported: their names depend on settings that the manifest does
-        not contain.
+        Results of the accuracy study are not checked, because their names depend on settings outside the
+        manifest.
         """
         keys = (
             self.manifest.key(robot, index)
@@ -453,7 +453,7 @@ def _acquire_lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_LOCK_ATTEMPTS):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # `Store.writing_process` in another process may hold the lock for a moment.
+        time.sleep(0.1)  # A reader of the store holds the lock for a moment in `Store.writing_process`.
     raise InputError(
         "another process uses this store",
         where=str(folder),
