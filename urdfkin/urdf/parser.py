@@ -59,7 +59,7 @@ XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16.
-#: UTF-32 comes first, because its byte order mark begins with UTF-16's.
+#: UTF-32 comes first. Its byte order mark begins with the byte order mark of UTF-16.
 _WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -596,7 +596,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST_VERSION = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: Squares of lengths in this range neither underflow nor overflow.
+#: Limits between which the square of a length neither underflows nor overflows.
 MIN_VECTOR_LENGTH, MAX_VECTOR_LENGTH = 1e-150, 1e150
 
 
@@ -863,5 +863,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: A word with more characters is not similar to any tag or attribute of URDF.
+#: Longer words are not similar to any tag or attribute of URDF.
 _MAX_WORD_LENGTH = 32

@@ -66,9 +66,9 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: The largest relative error of rounding to single precision is u.
 #: Each entry of a stored rotation matrix has a rounding error of at most u.
 #: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
-#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
+#: Therefore, the scalar product of two columns has an error below 14 u (4 * 2 sqrt(3) u).
 #: Rounding changes the length of a stored quaternion by at most u.
-#: The cosine between two axes then changes by at most 4 u.
+#: Therefore, the cosine between two axes changes by at most 4 u.
 _MAX_SHEAR = 14.0
 #: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
 #: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
@@ -776,7 +776,7 @@ class _StageReader:
     def _read_limit(self, prim: Any, name: str) -> float:
         """Return a limit of a `PhysicsJoint`.
 
-        Raise InputError if the limit is blocked, because USD readers then use different values.
+        Raise InputError if a layer blocks the value. USD readers use different values for a blocked limit.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:

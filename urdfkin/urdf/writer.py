@@ -40,7 +40,7 @@ def _needs_version_1_2(joint: Joint) -> bool:
     if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # A joint without position limits and without finite other limits needs no <limit> element.
+    # If effort and velocity are infinite, a joint without position limits needs no <limit> element.
     return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 

@@ -42,8 +42,8 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
     """Return the names of the arguments that a xacro file and its included files declare or use.
 
-    Return None if one of the files cannot be found or read, or if there are over `MAX_SEARCHED_FILES` files.
-    Files with computed names count as not found.
+    Return None if the names may be incomplete: a file cannot be found or read, a file name is computed, or
+    there are more than `MAX_SEARCHED_FILES` files.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:

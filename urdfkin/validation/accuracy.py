@@ -102,14 +102,14 @@ def accuracy_study(
 ) -> AccuracyStudy:
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
-    `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
+    `base` contains one motion of the root link for all samples, or one motion for each sample. Without
     `base`, the root link is fixed.
 
     Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
     eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
 
     Raises:
-        InputError: `base` has neither one motion nor one motion for each sample.
+        InputError: The number of motions in `base` is wrong.
     """
     x = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
     longest_path = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))

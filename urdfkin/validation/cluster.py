@@ -38,8 +38,8 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
-#: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * (threads of all workers) + _EXTRA_CHUNKS.
-#: With this number of chunks, every thread has a next chunk.
+#: The limit on unanswered chunks is proportional to the number of threads, plus a constant.
+#: A limit above one chunk for each thread avoids that a thread waits for its next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe: a chunk can crash a child process of a Dask worker, but not the Dask worker.
@@ -203,9 +203,9 @@ class Cluster:
         self._client = client
         #: For each sent chunk without an answer: its task, and how often the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: For each robot, the future of its text. The workers store this text.
+        #: Futures of the texts that the workers store, by robot.
         self._robot_texts: dict[int, Future[bytes]] = {}
-        #: For each robot, the number of sent chunks without an answer.
+        #: Number of sent chunks without an answer, by robot.
         self._pending_counts = Counter[int]()
         self._limit, self._limit_time = _EXTRA_CHUNKS, float("-inf")
 

@@ -6,9 +6,9 @@ results with the user's results. A mistake explains the whole result if
 
     max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000,
 
-where each difference is divided by its scale. If no mistake explains the whole result, the module looks for
-mistakes in single columns of a Jacobian, then for a mistake together with exchanged linear and angular rows.
-At most three mistakes are reported.
+where each difference is divided by its scale. If no mistake explains the whole result, single columns of a
+Jacobian are searched for mistakes. The last step combines each mistake with exchanged linear and angular
+rows. At most three mistakes are reported.
 """
 
 from __future__ import annotations

@@ -79,15 +79,15 @@ class ReportedJoint(TypedDict):
     q: Annotated[
         int | None,
         doc(
-            "Index in q of the joint's first coordinate; for a mimic joint, index of the mimicked joint."
-            " null: none."
+            "Index in q of the joint's first coordinate. A mimic joint has the index of the mimicked joint."
+            " null: a fixed joint."
         ),
     ]
     v: Annotated[
         int | None,
         doc(
-            "Index of the joint's first entry in v and in a; for a mimic joint, index of the mimicked joint."
-            " null: none."
+            "Index of the joint's first entry in v and in a. A mimic joint has the index of the mimicked"
+            " joint. null: a fixed joint."
         ),
     ]
     limit: Annotated[ReportedLimit | None, doc("The joint's limits; null: the joint has no limits.")]
@@ -308,8 +308,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of results that do not show which library is wrong. Either no two of the three libraries"
-            " agree, or one library agrees with the two others, and these two disagree."
+            "Number of results that do not show which library is wrong: none or two of the three pairs of"
+            " libraries agree."
         ),
     ]
 
@@ -329,7 +329,7 @@ class ReportedCheck(TypedDict):
     bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        doc("Smallest and largest bound of the results, in eps * scale; null and 0: nothing was compared."),
+        doc("Smallest and largest bound of the results, in eps * scale. [null, 0]: nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],

@@ -40,7 +40,7 @@ AnswerCallback = Callable[[Task, Answer], None]
 class Engine(Protocol):
     """Interface of an engine.
 
-    If `Engine.run` raises an exception, `validate` runs no further task. Its report contains the answers that
+    If `Engine.run` raises an exception, `validate` runs no further task. The report contains the answers that
     the callback has received.
     """
 

@@ -202,10 +202,10 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return the upper edge of the percentile's bin, but at most `worst`; 0.0 for the first bin.
+    """Return the upper edge of the bin that contains a percentile.
 
-    The error is at most the width of the bin. The result for the last bin, which has no upper edge, is the
-    last edge.
+    The result is at most `worst`. It is 0.0 for the first bin, and the last edge for the last bin. The error
+    is at most the width of the bin, except in the last bin.
     """
     counts = np.cumsum(histogram)
     if not counts[-1]:
@@ -229,8 +229,8 @@ def compute_error_stats(
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
     `frames` are the names of the frames, joints or columns. `first_sample` is the index of the first sample
-    within the robot. `inputs` contains q, v and a of each sample. If the factor k of the bound is not finite
-    or not positive, no result is within the bound.
+    within the robot. `inputs` contains q, v and a of each sample. Every result fails unless the factor k of
+    the bound is finite and positive.
     """
     n, count = results.shape[:2]
     if not results.size:

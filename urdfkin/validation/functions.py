@@ -1,9 +1,9 @@
 """Compare a user's function with urdfkin and the oracle.
 
-The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. The allowed difference
-is a derived bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with
-urdfkin, the error is in the function.
+The user's function computes a quantity from q, from q and v, or from q, v and a. The function is called at
+random configurations, at the zero configuration and at the joint limits. The allowed difference is a derived
+bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with urdfkin, the error
+is in the function.
 """
 
 from __future__ import annotations

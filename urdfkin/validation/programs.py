@@ -13,10 +13,10 @@ contains neither the values of locked joints nor the root joint. The answer is o
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
-The program runs with the rights of the user who starts it. If the program hangs, ends or gives an answer of
-another form, the call for this configuration raises `ProgramError`, and the program is stopped. The call for
-the next configuration starts the program again. After three consecutive failures, the program is not started
-again. An answer with the entry `error` raises `ProgramError`, but does not stop the program.
+The program runs with the rights of the user who starts it. If the program hangs, ends or gives an invalid
+answer, the call raises `ProgramError` and stops the program. The next call starts the program again. After
+three consecutive failures, the program is not started again. An answer with the entry `error` raises
+`ProgramError`, but does not stop the program.
 """
 
 from __future__ import annotations

@@ -176,7 +176,7 @@ class ValidationReport(Displayable):
         interrupted: Whether the run ended early. Finished results are included.
         library_versions: Package versions of the run. None: the installed versions.
         studies: Results of the accuracy study, one for each compared robot. Empty if no study was requested.
-            An element is None if the robot's study failed or is missing.
+            The result of a robot is None if its study failed or is missing.
     """
 
     robots: tuple[RobotReport, ...]

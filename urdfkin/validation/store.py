@@ -236,7 +236,7 @@ class Store:
         """Count the chunks with a stored result, for each robot.
 
         Returns:
-            {robot: (number of chunks with a result, whether a chunk failed)}.
+            For each robot: the number of chunks with a result, and whether a chunk failed.
         """
         names = {path.name for kind in (_DONE, _FAILED) for path in self._find_files(kind)}
         counts = {}
