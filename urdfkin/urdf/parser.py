@@ -708,9 +708,8 @@ class JointReader:
     ) -> str | None:
         """Return the value of a required attribute, and report a missing attribute.
 
-        `example` shows the attribute in the remedy. If `number` is False, the function also reports an empty
-        value. If `number` is True, `NumberReader` reports an empty value. Return None for a missing or empty
-        value.
+        An empty value is also reported, except if `number` is True. Then `NumberReader` reports the value.
+        `example` shows the attribute in the remedy. Return None for a missing or empty value.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -848,7 +847,10 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    """Return the name in `known` that is most similar to `word`, or has the same letters; otherwise None."""
+    """Return the most similar name in `known`; None if there is none.
+
+    Without a similar name, return a name with the same letters in another order.
+    """
     # The cache must not store a name of several megabytes.
     return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 

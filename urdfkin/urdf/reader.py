@@ -40,7 +40,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with the names of its parent link and child link.
 
-    Raise InputError if mimic joints form a cycle or an axis has no direction, and UnknownNameError if a
+    Raise InputError if mimic joints form a cycle, or if an axis has no direction. Raise UnknownNameError if a
     mimicked joint does not exist.
     """
     rules = _mimic_rules(joints) if mimic else {}
@@ -48,7 +48,7 @@ def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> lis
 
 
 def find_root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
-    """Return the only link without a parent; raise InputError if no link or several links have no parent."""
+    """Return the link without a parent; raise InputError unless there is exactly one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
         found = ", ".join(sorted(roots)) or "none"

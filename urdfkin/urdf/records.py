@@ -90,10 +90,7 @@ class Element:
 
     @property
     def top_level_element(self) -> Element:
-        """The child of `<robot>` that is or contains this element.
-
-        For `<robot>`, `top_level_element` is `<robot>` itself.
-        """
+        """The child of `<robot>` that contains this element; this element if it is `<robot>` or a child."""
         return self.top_level_ancestor or self
 
 

@@ -251,7 +251,7 @@ def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> UrdfText:
-    # `encode` must accept a lone surrogate, because the later check of the bytes reports it.
+    # `surrogatepass` keeps a lone surrogate. The check of the bytes reports it later.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return UrdfText(data, label, source)
 

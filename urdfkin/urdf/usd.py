@@ -577,7 +577,7 @@ class _StageReader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The direction rotX in "physxMimicJoint:rotX:referenceJoint" may differ from the mimic joint's.
+            # rotX in physxMimicJoint:rotX:referenceJoint may differ from the direction of the mimic joint.
             own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"

@@ -21,10 +21,10 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The function does not write
-    infinite limits. If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
+    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. Infinite limits are omitted.
+    If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
 
-    Raise InputError for a revolute or prismatic joint without finite position limits, and for a name with a
+    Raise InputError if a revolute or prismatic joint has no finite position limits, or if a name contains a
     character that XML does not allow.
     """
     version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""

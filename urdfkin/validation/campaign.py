@@ -163,8 +163,8 @@ def validate(
             if _should_load_kernels(len(unfinished_inputs) * samples) and (
                 isolate or any(map(_can_be_loaded, unfinished_inputs))
             ):
-                # Load or compile the kernels before the workers start.
-                # The computing time of a robot then does not contain the compilation.
+                # If the kernels are loaded before the workers start, no robot's computing time contains a
+                # compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()

@@ -201,7 +201,7 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: For each sent chunk without an answer: its task, and how often the chunk was sent.
+        #: Sent chunks without an answer: the task, and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
         #: Futures of the texts that the workers store, by robot.
         self._robot_texts: dict[int, Future[bytes]] = {}

@@ -31,7 +31,7 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
-        label: Name of the robot of the latest chunk; before the work, of the first robot.
+        label: Name of the robot of the latest chunk. Before the first chunk: name of the first robot.
     """
 
     robots_done: int

@@ -334,8 +334,8 @@ class ReportedCheck(TypedDict):
     histogram: Annotated[
         list[Count],
         doc(
-            "Number of results in each bin: below the first of `histogram_edges`, between two adjacent"
-            " edges, above the last edge."
+            "Number of results in each bin. The first bin is below the first of `histogram_edges`, and the"
+            " last bin is above the last edge."
         ),
     ]
     subjects: Annotated[

@@ -65,7 +65,7 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: The function's inputs: q, or q and v, or q, v and a.
-        bound: Largest allowed difference of each number: bound on rounding errors * `FunctionCheck.factor`.
+        bound: Allowed difference of each number: the bound on rounding errors times `FunctionCheck.factor`.
         replay: A command or a line of Python that computes the expected result.
     """
 

@@ -69,7 +69,7 @@ class Program:
         timeout: Longest time for an answer, in seconds; at most a day.
 
     Raises:
-        InputError: an empty command, or a timeout that is not positive or is above a day.
+        InputError: the command is empty, or the timeout is not between 0 and one day.
         SourceError: the program cannot be started.
 
     >>> import urdfkin
