@@ -672,7 +672,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def read_name(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; report a missing or empty name, and return an empty string."""
+    """Return the name of a link or joint; an empty string if there is none. A missing name is reported."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"

@@ -150,8 +150,8 @@ def read_source(
     """Read a URDF from any source.
 
     Read at most `max_bytes` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
-    `max_bytes` + 1 characters of an open text file. If the function reads more than `max_bytes` bytes or
-    characters, the source is too long.
+    `max_bytes` + 1 characters of an open text file. The last byte or character shows that the source is too
+    long.
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
 

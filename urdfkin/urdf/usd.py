@@ -77,7 +77,7 @@ _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Names of USD relationships to a mimicked joint. The group matches the direction in a name, such as rotX.
+#: Names of USD relationships to a mimicked joint. The regex group is a direction, such as rotX.
 _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")

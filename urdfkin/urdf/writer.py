@@ -1,8 +1,8 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-Each number has enough digits to restore the same double. A rotation is written as roll, pitch and yaw, from
-which URDF readers compute the rotation up to rounding errors. In an existing text, byte 0 is the first byte
-after a byte order mark.
+Each number has enough digits to restore the same double. A rotation is written as roll, pitch and yaw. URDF
+readers restore the rotation up to rounding errors. In an existing text, byte 0 is the first byte after a byte
+order mark.
 """
 
 from __future__ import annotations

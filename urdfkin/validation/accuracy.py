@@ -53,7 +53,7 @@ from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compu
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
-#: Representations of the orientation in each row of a study's table for analytical Jacobians.
+#: The representations of the orientation that each row for analytical Jacobians summarizes.
 #: Angles about fixed axes are omitted, because they are Euler angles in the reverse order.
 #: The Jacobian has the same rows in the reverse order.
 _ORIENTATION_REPRESENTATIONS = {

@@ -89,7 +89,7 @@ def validate(
         oracle: "mujoco": also compare every frame with MuJoCo, which needs the extra `mujoco`. If only two of
             the three libraries agree, the report names the third library.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
-            robot is reported as not verified with the reason, and the other robots continue.
+            robot is not verified, and the report states the reason. Other robots are not affected.
         executor: An executor that runs the chunks, instead of `jobs` local processes. The executor has the
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
@@ -108,7 +108,7 @@ def validate(
     Raises:
         InputError: An argument is invalid, for example `samples` < 0, `jobs` < 1, or `shard` without `store`.
             The oracle is not installed. The store contains a validation with other robots, settings or
-            versions, or another process uses the store.
+            versions. Another process uses the store.
         UnknownNameError: There is no oracle with this name.
         InstallationError: Pinocchio is missing or unsupported, or the installed module `pinocchio` belongs to
             another project.

@@ -47,7 +47,7 @@ SPECIAL_SAMPLES = 3
 #: Minimum number of chunks of a robot with 200 or more samples, so that several workers can share the robot.
 _MIN_CHUNKS = 8
 #: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
-#: A chunk of this size takes about half a second for a robot with seven joints.
+#: For a robot with seven joints, 1000 configurations take about half a second.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")

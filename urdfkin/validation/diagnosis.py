@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains the user's results if `DiagnosisCase.remainder` is at most this number.
+#: Largest `DiagnosisCase.remainder` of a mistake that explains the user's results.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
 #: Number of configurations in a fast first test for exchanged joints.

@@ -288,7 +288,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """Number of results in which one library differs and the other two agree, for each of three libraries."""
+    """For each library, the number of results in which only this library differs from the others."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -357,7 +357,7 @@ class ReportedTimings(TypedDict):
 
     read: Annotated[float, doc("Time of reading the file, and of building the models and tables.")]
     urdfkin: Annotated[
-        float, doc("Time of computing with urdfkin, and of loading or compiling its kernels in this time.")
+        float, doc("Time of computing with urdfkin. It includes the loading or compilation of kernels.")
     ]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
     compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
@@ -408,8 +408,8 @@ class ReportedRobot(TypedDict):
     model: Annotated[
         ReportedModel | None,
         doc(
-            "Links and joints. null: the file could not be read, or the robot's first chunk has no result."
-            " Then there are also no chains."
+            "Links and joints. null: unknown, for example because the file could not be read. Without links"
+            " and joints, there are no chains."
         ),
     ]
     findings: Annotated[list[ReportedFinding], doc("Findings of the linter in the robot's file.")]

@@ -53,7 +53,8 @@ class CrossCheck:
 
     Attributes:
         by: Name of the second oracle.
-        alone: Number of results in which only one library differs, for each of `CROSS_CHECKED_LIBRARIES`.
+        alone: For each of `CROSS_CHECKED_LIBRARIES`, the number of results in which only this library
+            differs from the others.
     """
 
     by: str

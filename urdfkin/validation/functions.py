@@ -113,8 +113,7 @@ class FunctionCheck(Displayable):
         rows: The `bound_ratio` of each row, for example {"vx": 0.2}.
         columns: The `bound_ratio` of each column of a Jacobian. The keys are names of joint velocities. Empty
             for a result without such columns, for example a placement.
-        worst: The worst result; None if no result was compared, or if the results contain no numbers (a
-            Jacobian of a robot without moving joints).
+        worst: The worst result; None if no number was compared.
         errors: Number of configurations with an exception, or without real numbers in the right shape.
         first_errors: At most five exceptions and invalid results, with messages.
         diagnoses: Possible causes of the differences: mistakes in the function, rounding, or results that are
@@ -523,7 +522,7 @@ class _Run:
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Convert the scale of a bound from urdfkin's convention to the convention of the user's function.
 
-        Jacobians, after the rows are reordered:
+        After the rows of a Jacobian are reordered, the columns are converted with a matrix:
 
             converted result = result @ inverse
             converted scale = scale @ |inverse|
@@ -551,12 +550,12 @@ class _Run:
     def _compute_conversion_k(self, q: FloatArray) -> float:
         """Return k; the rounding error of the conversion is at most k * eps * scale.
 
-        Reordering has no rounding errors. Computed angles, for example degrees from radians, are rounded:
+        Reordering has no rounding errors. If angles are converted, for example from radians to degrees:
 
-            error of an angle and of its rotation matrix <= 2 eps |q|
-            error of a vector <= sum of the errors of all rotation matrices
-            term of a result: product of `factors` vectors
-            velocity conversion of a planar or floating joint: <= 16 eps
+        - The error of an angle and of its rotation matrix is at most 2 eps |q|.
+        - The error of a vector is at most the sum of the errors of all rotation matrices.
+        - A term of a result is a product of `row.factors` vectors.
+        - The velocity conversion of a planar or floating joint has an error of at most 16 eps.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None

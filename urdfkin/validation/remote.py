@@ -48,7 +48,7 @@ def store_robot(robot: bytes) -> bytes:
 def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
     """Run a pickled chunk in a worker process; after a crash, try a new process.
 
-    If the versions or digests differ from the client's, the chunk is not run.
+    The chunk is not run if the client has other versions or digests.
     """
     if client_provenance != provenance():
         return "other code", provenance()
@@ -72,7 +72,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """A pickled robot and a pickled chunk, which the receiver unpickles as one `Chunk`."""
+    """A pickled robot and a pickled chunk. The receiver unpickles one `Chunk`."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
