@@ -1,7 +1,7 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
 The XML parser is expat. expat reports the position of every start tag, and parses deep nesting without
-recursion. It keeps namespace prefixes, and opens no file. If a document type declaration has brackets or
+recursion. expat keeps namespace prefixes, and opens no file. If a document type declaration has brackets or
 refers to an external file, parsing stops with an error. Therefore, only the entities of XML itself are
 expanded, for example `&amp;`.
 
@@ -178,7 +178,7 @@ LIBXML2_DEPTH = 256
 #: Maximum number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
 
-#: Once this many characters of an element's text are stored, further text is ignored.
+#: Number of stored characters after which the rest of an element's text is ignored.
 _MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
 #: Attributes that name a link or joint.
@@ -533,7 +533,7 @@ class NumberReader:
     def _report_refused_by_urdfdom(self, element: Element, attribute: str, what: str) -> None:
         value = element.attributes[attribute]
         rule, message = WHITESPACE_IN_NUMBER, f"{attribute} has {what}, which urdfdom refuses"
-        if self.bad_number is not BAD_NUMBER:  # Kinematics does not use this number.
+        if self.bad_number is not BAD_NUMBER:  # Kinematics does not use the number.
             rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
             rule,

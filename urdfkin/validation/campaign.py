@@ -138,7 +138,7 @@ def validate(
     collector = ResultCollector(
         robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
     )
-    # An executor's machines compute their own memory limits.
+    # The machines of an executor compute their own memory limits.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()

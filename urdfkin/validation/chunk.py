@@ -59,7 +59,7 @@ class Chunk:
     """A range of samples of one robot.
 
     Attributes:
-        first_draw: Index of the first draw.
+        first_draw: Index of the first group of `DRAW_SIZE` random configurations.
         samples: Number of random configurations.
         memory_limit: Allowed memory, bytes; None: half of the free memory.
     """

@@ -38,8 +38,8 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
-#: The limit on unanswered chunks is proportional to the number of threads, plus a constant.
-#: A limit above one chunk for each thread avoids that a thread waits for its next chunk.
+#: The maximum number of unanswered chunks is _CHUNKS_PER_THREAD for each thread, plus _EXTRA_CHUNKS.
+#: Therefore, every thread always has a next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe: a chunk can crash a child process of a Dask worker, but not the Dask worker.

@@ -66,9 +66,12 @@ class DiagnosisCase:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return max |actual - predicted| / max |actual - expected|; each difference is divided by its scale.
+        """Return the part of the difference that a mistake does not explain.
 
-        Return inf if `predicted` is not finite, or if `actual` equals `expected`.
+        Each difference is divided by its scale. Return inf if `predicted` is not finite, or if `actual`
+        equals `expected`. Otherwise, return:
+
+            max |actual - predicted| / max |actual - expected|
 
         Args:
             predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.

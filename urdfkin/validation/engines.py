@@ -1,8 +1,8 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks, and passes the answer of each task to a callback. The order of the answers does not
-matter: the collector sorts the answers, so no result depends on the engine. If the answer of a chunk is a
-`Failure`, an engine may skip the remaining chunks of the same robot. The engine must run all other chunks.
+An engine runs tasks, and passes the answer of each task to a callback. The collector sorts the answers, so no
+result depends on the engine or the order of the answers. If the answer of a chunk is a `Failure`, an engine
+may skip the remaining chunks of the same robot. The engine must run all other chunks.
 Tasks are created only when they are needed, so a million tasks take little memory.
 
 `WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker.

@@ -106,8 +106,8 @@ class FunctionCheck(Displayable):
         compared: Number of results that are real numbers in the right shape, NaN included.
         factor: Number by which each bound is multiplied.
         eps_scale: Largest difference in multiples of eps * scale.
-        bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference
-            bound * factor. The ratio is at most 1 if all results agree.
+        bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference. The
+            ratio is at most 1 if all results agree.
         oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of the allowed
             difference. None without an oracle.
         rows: The `bound_ratio` of each row, for example {"vx": 0.2}.
@@ -264,9 +264,8 @@ def verify_function(
     The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
     quantities, and v (nv,) and a (nv,) for some quantities. Without `convention`, the units are rad, m and s.
     The values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An
-    exception or a result of wrong shape does not end the check. The check reports the exceptions and wrong
-    shapes.
+    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect.
+    Exceptions and wrong shapes are reported, and do not end the check.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.

@@ -68,7 +68,7 @@ def end_idle() -> None:
 
 
 class _CrashError(Exception):
-    """The text is the signal or exit status of the crashed process."""
+    """A process crashed. The message is its signal or exit status."""
 
 
 class _Parcel:

@@ -491,7 +491,7 @@ class FailedStudy:
 class StudySettings:
     """Settings of the accuracy study.
 
-    With `moving_base`, the root link has a random motion in each sample; otherwise, it is fixed.
+    With `moving_base`, the root link has a random motion in each sample. Otherwise, the root link is fixed.
     """
 
     samples: int
