@@ -107,7 +107,7 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
 
     Example of a chain: z mimics y, and y mimics the independent joint x. The returned rule for z is:
 
-        z = m2 (m1 x + b1) + b2
+    `z = m2 (m1 x + b1) + b2`
 
     urdfkin and Pinocchio combine the rules in the same order, from x to z. Therefore, the rounding errors are
     equal.

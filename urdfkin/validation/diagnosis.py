@@ -2,13 +2,13 @@
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. A mistake explains the whole result if
+results with the user's results. Each difference is divided by its scale. A mistake explains the whole result
+under this condition:
 
-    max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000,
+`max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000`
 
-where each difference is divided by its scale. If no mistake explains the whole result, single columns of a
-Jacobian are searched for mistakes. The last step combines each mistake with exchanged linear and angular
-rows. At most three mistakes are reported.
+If no mistake explains the whole result, single columns of a Jacobian are searched for mistakes. The last step
+combines each mistake with exchanged linear and angular rows. At most three mistakes are reported.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class DiagnosisCase:
         Each difference is divided by its scale. Return inf if `predicted` is not finite, or if `actual`
         equals `expected`. Otherwise, return:
 
-            max |actual - predicted| / max |actual - expected|
+        `max |actual - predicted| / max |actual - expected|`
 
         Args:
             predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.

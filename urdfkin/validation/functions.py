@@ -521,10 +521,8 @@ class _Run:
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Convert the scale of a bound from urdfkin's convention to the convention of the user's function.
 
-        After the rows of a Jacobian are reordered, the columns are converted with a matrix:
-
-            converted result = result @ inverse
-            converted scale = scale @ |inverse|
+        After its rows are reordered, a Jacobian is multiplied from the right by `conversion.inverse_matrix`.
+        The scale is multiplied by the absolute values of this matrix.
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
