@@ -154,7 +154,7 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     message = refused(expanded, inside.replace('default=""', f'default="{secret}"'))
     for words in (
         "It may also read files and folders that the user passes as arguments",
-        "if VALUE is the path of a file or folder, the xacro file may read this path",
+        "the xacro file may read a file or folder if its path is the VALUE of an argument",
     ):
         assert words in message
     assert SECRET in expanded(inside, file=str(secret))

@@ -1,9 +1,9 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-The XML parser is expat, which reports the position of every start tag, keeps namespace prefixes, parses deep
-nesting without recursion, and opens no file. If a document type declaration has brackets or refers to an
-external file, parsing stops with an error. Therefore, only the entities of XML itself are expanded, for
-example `&amp;`.
+The XML parser is expat. expat reports the position of every start tag, and parses deep nesting without
+recursion. expat keeps namespace prefixes, and opens no file. If a document type declaration has brackets or
+refers to an external file, parsing stops with an error. Therefore, only the entities of XML itself are
+expanded, for example `&amp;`.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
 finding.
@@ -59,7 +59,7 @@ XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16.
-#: UTF-32 comes first, because its byte order mark begins with UTF-16's.
+#: UTF-32 comes first. Its byte order mark begins with the byte order mark of UTF-16.
 _WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -178,7 +178,7 @@ LIBXML2_DEPTH = 256
 #: Maximum number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
 
-#: Once this many characters of an element's text are stored, further text is ignored.
+#: Number of stored characters after which the rest of an element's text is ignored.
 _MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
 #: Attributes that name a link or joint.
@@ -398,7 +398,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: Pairs (message, remedy or None) for each message of expat.
+#: A message and a remedy (or None) for each error of expat.
 _TEXTS_BY_EXPAT_ERROR: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -435,7 +435,7 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 class NumberReader:
     """Read numbers from attributes, and report mistakes.
 
-    `bad_number` is the rule about an invalid number. `bad_vector` is the rule about a wrong count of numbers.
+    The rule `bad_number` reports an invalid number. The rule `bad_vector` reports a wrong count of numbers.
     `effect` is appended to the messages of both rules.
     """
 
@@ -533,7 +533,7 @@ class NumberReader:
     def _report_refused_by_urdfdom(self, element: Element, attribute: str, what: str) -> None:
         value = element.attributes[attribute]
         rule, message = WHITESPACE_IN_NUMBER, f"{attribute} has {what}, which urdfdom refuses"
-        if self.bad_number is not BAD_NUMBER:  # Kinematics does not use this number.
+        if self.bad_number is not BAD_NUMBER:  # Kinematics does not use the number.
             rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
             rule,
@@ -546,7 +546,7 @@ class NumberReader:
         )
 
 
-#: Messages about invalid numbers in these elements name the attribute, but not the tag.
+#: Tags that messages about invalid numbers omit. The messages contain the attribute's name.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
@@ -596,7 +596,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST_VERSION = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: Squares of lengths in this range neither underflow nor overflow.
+#: Limits between which the square of a length neither underflows nor overflows.
 MIN_VECTOR_LENGTH, MAX_VECTOR_LENGTH = 1e-150, 1e150
 
 
@@ -672,7 +672,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def read_name(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; report a missing or empty name, and return an empty string."""
+    """Return the name of a link or joint; an empty string if there is none. A missing name is reported."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -708,9 +708,8 @@ class JointReader:
     ) -> str | None:
         """Return the value of a required attribute, and report a missing attribute.
 
-        `example` shows the attribute in the remedy. If `number` is False, the function also reports an empty
-        value. If `number` is True, `NumberReader` reports an empty value. Return None for a missing or empty
-        value.
+        An empty value is also reported, except if `number` is True. Then `NumberReader` reports the value.
+        `example` shows the attribute in the remedy. Return None for a missing or empty value.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -780,7 +779,7 @@ class JointReader:
         axis = joint.axis_element = joint.element.find("axis")
         if axis is None:
             return
-        if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
+        if joint.kind in ("fixed", "floating"):
             effect = f"; a {joint.kind} joint ignores its axis"
             NumberReader(self.report, IGNORED_VALUE, IGNORED_VALUE, effect).read_vector(axis, "xyz")
             return
@@ -789,7 +788,7 @@ class JointReader:
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
             return  # Rule URDF212 reports text between tags.
-        message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
+        message = "some readers read <axis> without xyz as 1 0 0; urdfdom reads 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
         # A planar joint moves in the XY plane of its frame, independent of the axis.
         severity = Severity.WARNING if joint.kind == "planar" else None
@@ -848,7 +847,10 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    """Return the name in `known` that is most similar to `word`, or has the same letters; otherwise None."""
+    """Return the most similar name in `known`; None if there is none.
+
+    Without a similar name, return a name with the same letters in another order.
+    """
     # The cache must not store a name of several megabytes.
     return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 
@@ -863,5 +865,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: A word with more characters is not similar to any tag or attribute of URDF.
+#: Longer words are not similar to any tag or attribute of URDF.
 _MAX_WORD_LENGTH = 32

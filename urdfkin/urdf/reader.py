@@ -40,7 +40,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with the names of its parent link and child link.
 
-    Raise InputError if mimic joints form a cycle or an axis has no direction, and UnknownNameError if a
+    Raise InputError if mimic joints form a cycle, or if an axis has no direction. Raise UnknownNameError if a
     mimicked joint does not exist.
     """
     rules = _mimic_rules(joints) if mimic else {}
@@ -48,7 +48,7 @@ def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> lis
 
 
 def find_root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
-    """Return the only link without a parent; raise InputError if no link or several links have no parent."""
+    """Return the link without a parent; raise InputError unless there is exactly one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
         found = ", ".join(sorted(roots)) or "none"
@@ -105,9 +105,12 @@ def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return a rule for each mimic joint, by joint name. The mimicked joint of each rule is independent.
 
-    Example of a chain: z mimics y, and y mimics the independent joint x. The returned rule of z is
-    z = m2 (m1 x + b1) + b2. urdfkin and Pinocchio combine the rules in the same order, from x to z.
-    Therefore, they have equal rounding errors.
+    Example of a chain: z mimics y, and y mimics the independent joint x. The returned rule for z is:
+
+    `z = m2 (m1 x + b1) + b2`
+
+    urdfkin and Pinocchio combine the rules in the same order, from x to z. Therefore, the rounding errors are
+    equal.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

@@ -21,8 +21,7 @@ class SizeLimits:
     """Limits on the size of a URDF file and its content.
 
     Attributes:
-        depth: Maximum number of levels of nested elements. Pinocchio refuses a file with more levels than the
-            default.
+        depth: Maximum number of levels of nested elements. The default is Pinocchio's limit.
         attributes: Maximum number of attributes of one element.
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
@@ -91,10 +90,7 @@ class Element:
 
     @property
     def top_level_element(self) -> Element:
-        """The child of `<robot>` that is or contains this element.
-
-        For `<robot>`, `top_level_element` is `<robot>` itself.
-        """
+        """The child of `<robot>` that contains this element; this element if it is `<robot>` or a child."""
         return self.top_level_ancestor or self
 
 

@@ -150,8 +150,8 @@ def read_source(
     """Read a URDF from any source.
 
     Read at most `max_bytes` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
-    `max_bytes` + 1 characters of an open text file. If the function reads more than `max_bytes` bytes or
-    characters, the source is too long.
+    `max_bytes` + 1 characters of an open text file. The last byte or character shows that the source is too
+    long.
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
 
@@ -251,7 +251,7 @@ def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> UrdfText:
-    # `encode` must accept a lone surrogate, because the later check of the bytes reports it.
+    # `surrogatepass` keeps a lone surrogate. The check of the bytes reports it later.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return UrdfText(data, label, source)
 

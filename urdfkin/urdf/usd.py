@@ -4,15 +4,15 @@
   prim below a body also becomes a link; a fixed joint connects this link with the body.
 - A joint prim contains two poses of the joint frame: pose A in the first body, and pose B in the second body.
   With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
-  If the second body is the parent in the tree, urdfkin uses the inverse, B J(q)^-1 A^-1. To compute the
-  inverse, urdfkin exchanges A and B and reverses the joint axis.
+  If the second body is the parent in the tree, urdfkin exchanges A and B and reverses the joint axis. The
+  pose of the first body in the second body is B J(q)^-1 A^-1.
 - Lengths are multiplied by `metersPerUnit`, and angles are converted from degrees. If the up axis is Y, the
   robot is rotated, so that z is up.
 - Joints that close a loop, name a missing prim, or are excluded from the articulation are reported.
 
 A stage consists of files, called layers. Before OpenUSD combines the layers, `find_layer_files` reads each
-layer separately. The function refuses a reference to a network address, and a reference to a file outside the
-robot's folder, package and repository.
+layer separately. `find_layer_files` refuses references to network addresses, and to files outside the robot's
+folder, package and repository.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ _MAX_LAYERS = 1_000
 #: A USD limit of infinity or the largest single precision number means no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: A frame has shear if the cosine between two axes of the frame exceeds `_MAX_SHEAR` * u * n.
-#: The factor n is the number of prims on the path of the frame's prim.
-#: The factor u is the largest relative error of rounding to single precision.
+#: The path of the frame's prim contains n prims.
+#: The largest relative error of rounding to single precision is u.
 #: Each entry of a stored rotation matrix has a rounding error of at most u.
 #: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
-#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
+#: Therefore, the scalar product of two columns has an error below 14 u (4 * 2 sqrt(3) u).
 #: Rounding changes the length of a stored quaternion by at most u.
-#: The cosine between two axes then changes by at most 4 u.
+#: Therefore, the cosine between two axes changes by at most 4 u.
 _MAX_SHEAR = 14.0
 #: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
 #: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
@@ -77,7 +77,7 @@ _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Names of USD relationships to a mimicked joint. The group matches the direction in a name, such as rotX.
+#: Names of USD relationships to a mimicked joint. The regex group is a direction, such as rotX.
 _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
@@ -94,7 +94,7 @@ _SHAPE_XFORM_NAMES = ("visual", "visuals", "collision", "collisions")
 #: Rotation of the y axis onto the z axis.
 _ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: Kinds of remarks. The module `lint.rules.left_out` defines a rule for each kind.
+#: Kinds of remarks. Each kind has a rule in the module `lint.rules.left_out`.
 RemarkKind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -159,7 +159,7 @@ class Usd:
             3. the sum of the lengths (m) of the vectors that the orientation errors rotate,
             4. a bound on the relative error of a mimic joint's value, or 0 for other joints,
             5. the distance (m) between the joint frame and the child frame.
-        joints: The values of each joint prim in the tree, by the path of the prim.
+        joints: The joint prims in the tree. The keys are the paths of the prims.
         meters_per_unit: The stage's metersPerUnit.
     """
 
@@ -193,10 +193,9 @@ def import_openusd() -> Any:
 def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage.
 
-    The function checks the references of each layer before OpenUSD follows the references. Raise InputError
-    for a forbidden reference, value clips, a Git LFS pointer, a layer that OpenUSD does not accept, and more
-    than 1,000 layers. Raise SourceError for an unreadable file, and if the files together have more than
-    `MAX_BYTES` bytes.
+    Check the references of each layer before OpenUSD follows the references. Raise InputError for a forbidden
+    reference, value clips, a Git LFS pointer, a layer that OpenUSD does not accept, and more than 1,000
+    layers. Raise SourceError for an unreadable file, and for more than `MAX_BYTES` bytes in total.
     """
     allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
@@ -235,7 +234,7 @@ def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
     """Raise InputError if a prim has value clips.
 
-    A value clip refers to a file. OpenUSD does not list this file among the dependencies of the layer.
+    OpenUSD does not list the files of value clips among the dependencies of the layer.
     """
     found: list[str] = []
 
@@ -288,8 +287,8 @@ def read_usd(
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
-    that has the variant set. `articulation` is the path or name of the articulation to read, or the path of a
-    prim above several articulations. `name` is the name of the stage in messages.
+    that has the variant set. `articulation` is the path or name of an articulation. The path of an ancestor
+    selects all articulations below the ancestor. `name` is the name of the stage in messages.
 
     | Error | Cause |
     |---|---|
@@ -317,8 +316,8 @@ def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], 
     """Select variants of a stage, expand its instances, and return the paths of the expanded instances.
 
     OpenUSD cannot select a variant inside an instance. If a prim inside an instance has the variant set, the
-    function expands the instance: the instance becomes an ordinary prim. The function writes only to the
-    session layer, which OpenUSD does not save.
+    instance is expanded to an ordinary prim. All changes are in the session layer, which OpenUSD does not
+    save.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     expanded_instances = set[str]()
@@ -407,7 +406,7 @@ class _StageReader:
     _edges: list[_JointPrim] = field(default_factory=list)
     _joints_read: dict[str, UsdJoint] = field(default_factory=dict)
     _single_rounding_terms: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # Pinocchio names the world `universe`, and a moving base's joint `root_joint`.
+    # Pinocchio itself uses the names `universe` and `root_joint`.
     _used_link_names: set[str] = field(default_factory=lambda: {"universe"})
     _used_joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _meters_per_unit: float = 1.0
@@ -578,7 +577,7 @@ class _StageReader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The direction rotX in "physxMimicJoint:rotX:referenceJoint" may differ from the mimic joint's.
+            # rotX in physxMimicJoint:rotX:referenceJoint may differ from the direction of the mimic joint.
             own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -647,8 +646,8 @@ class _StageReader:
             length_A + length_B,
             (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
         )
-        # A and B are poses in a body, or in a world with z up.
-        # `UsdJoint` contains poses in a body, or in the stage's world, in which y may be up.
+        # Without a body, A or B is a pose in a world with z up.
+        # Without a body, the pose in `UsdJoint` is a pose in the stage's world, where y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             directions, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -777,7 +776,7 @@ class _StageReader:
     def _read_limit(self, prim: Any, name: str) -> float:
         """Return a limit of a `PhysicsJoint`.
 
-        Raise InputError if the limit is blocked, because USD readers then use different values.
+        Raise InputError if a layer blocks the value. USD readers use different values for a blocked limit.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -866,7 +865,7 @@ class _StageReader:
     ) -> _Articulation:
         """Return the articulation with the path or name `articulation`.
 
-        If `articulation` is the path of an ancestor, return all articulations below the ancestor as one.
+        If `articulation` is the path of an ancestor, join all articulations below the ancestor.
         """
         if not articulations:
             message = "this stage has no joint between bodies"
@@ -1256,8 +1255,8 @@ def _quaternion_rounding(xyzw: FloatArray) -> float:
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a
     four-dimensional box. Only the component of this vector that is perpendicular to the quaternion changes
-    the rotation. The length of this component is greatest at a corner of the box, so the function compares
-    all corners.
+    the rotation. The perpendicular component is longest at a corner of the box. Therefore, all corners are
+    compared.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))

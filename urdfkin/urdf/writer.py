@@ -1,8 +1,8 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-Each number has enough digits to restore the same double. A rotation is written as roll, pitch and yaw, from
-which URDF readers compute the rotation up to rounding errors. In an existing text, byte 0 is the first byte
-after a byte order mark.
+Each number has enough digits to restore the same double. A rotation is written as roll, pitch and yaw. URDF
+readers restore the rotation up to rounding errors. In an existing text, byte 0 is the first byte after a byte
+order mark.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The function does not write
-    infinite limits. If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
+    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. Infinite limits are omitted.
+    If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
 
-    Raise InputError for a revolute or prismatic joint without finite position limits, and for a name with a
+    Raise InputError if a revolute or prismatic joint has no finite position limits, or if a name contains a
     character that XML does not allow.
     """
     version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""
@@ -40,7 +40,7 @@ def _needs_version_1_2(joint: Joint) -> bool:
     if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # A joint without position limits and without finite other limits needs no <limit> element.
+    # If effort and velocity are infinite, a joint without position limits needs no <limit> element.
     return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 

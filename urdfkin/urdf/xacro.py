@@ -42,8 +42,8 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
     """Return the names of the arguments that a xacro file and its included files declare or use.
 
-    Return None if one of the files cannot be found or read, or if there are over `MAX_SEARCHED_FILES` files.
-    Files with computed names count as not found.
+    Return None if the names may be incomplete: a file cannot be found or read, a file name is computed, or
+    there are more than `MAX_SEARCHED_FILES` files.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
@@ -130,9 +130,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, timeout: float = EXPANSI
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="set arguments with --xacro-arg NAME:=VALUE; if VALUE is the path of a file or folder, the"
-        " xacro file may read this path; set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists"
-        " the operations that a xacro file may do",
+        remedy="set arguments with --xacro-arg NAME:=VALUE, and the folders of packages in ROS_PACKAGE_PATH;"
+        " the xacro file may read a file or folder if its path is the VALUE of an argument; docs/xacro.md"
+        " lists the allowed operations",
         question=QuestionsSection.XACRO,
     )
 

@@ -53,9 +53,9 @@ from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compu
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
-#: Representations of the orientation in each row of a study's table for analytical Jacobians.
-#: The study omits angles about fixed axes: their Jacobian has the same rows as a Jacobian of Euler angles,
-#: with the angles in reverse order.
+#: The representations of the orientation that each row for analytical Jacobians summarizes.
+#: Angles about fixed axes are omitted, because they are Euler angles in the reverse order.
+#: The Jacobian has the same rows in the reverse order.
 _ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -102,14 +102,14 @@ def accuracy_study(
 ) -> AccuracyStudy:
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
-    `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
+    `base` contains one motion of the root link for all samples, or one motion for each sample. Without
     `base`, the root link is fixed.
 
     Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
     eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
 
     Raises:
-        InputError: `base` has neither one motion nor one motion for each sample.
+        InputError: The number of motions in `base` is wrong.
     """
     x = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
     longest_path = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
@@ -221,9 +221,9 @@ class _AccuracyBatch:
 
 
 def _find_nonzero_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return indices (n, links, m) of columns: first a link's nonzero columns, then zero columns.
+    """Return the indices (n, links, m) of the nonzero columns for each sample and link.
 
-    m is the largest number of nonzero columns of any sample and link.
+    m is the largest number of nonzero columns. Indices of zero columns fill shorter rows.
     """
     is_zero = ~(scale > 0.0).any(axis=-2)
     width = int((~is_zero).sum(axis=-1).max(initial=0))
@@ -235,11 +235,11 @@ def _take_columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations, with q . near > 0.
+    """Return the unit quaternions (m, 4) of rotations.
 
     Args:
         R: (m, 3, 3) rotations.
-        near: (m, 4) quaternions.
+        near: (m, 4) quaternions. They determine the signs of the returned quaternions q: q . near > 0.
     """
     K = davenport_matrix(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.

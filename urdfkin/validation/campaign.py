@@ -89,7 +89,7 @@ def validate(
         oracle: "mujoco": also compare every frame with MuJoCo, which needs the extra `mujoco`. If only two of
             the three libraries agree, the report names the third library.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
-            robot is reported as not verified with the reason, and the other robots continue.
+            robot is not verified, and the report states the reason. Other robots are not affected.
         executor: An executor that runs the chunks, instead of `jobs` local processes. The executor has the
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
@@ -101,14 +101,14 @@ def validate(
         progress: Callback, called before the work and after each chunk.
 
     Returns:
-        The report on every requested robot; with `shard`, on every robot with chunks in the shard. A robot
-        that cannot be read or checked is reported with its error. An interrupt ends the run; finished results
-        stay in the report.
+        The report on all robots. With `shard`, the report contains only robots with chunks in the shard. A
+        robot that cannot be read or checked is reported with its error. After an interrupt, the report
+        contains the finished results.
 
     Raises:
         InputError: An argument is invalid, for example `samples` < 0, `jobs` < 1, or `shard` without `store`.
             The oracle is not installed. The store contains a validation with other robots, settings or
-            versions, or another process uses the store.
+            versions. Another process uses the store.
         UnknownNameError: There is no oracle with this name.
         InstallationError: Pinocchio is missing or unsupported, or the installed module `pinocchio` belongs to
             another project.
@@ -138,7 +138,7 @@ def validate(
     collector = ResultCollector(
         robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
     )
-    # An executor's machines compute their own memory limits.
+    # The machines of an executor compute their own memory limits.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
@@ -152,7 +152,7 @@ def validate(
             if stored_answers is not None:
                 campaign.load_answers(stored_answers)
             for i, error in read_errors.items():
-                # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
+                # After the first failure of a robot, `missing_chunks` yields no further chunk of the robot.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.make_task(i, index), make_failure(robot_inputs[i], error))
             unfinished_inputs = [
@@ -163,8 +163,8 @@ def validate(
             if _should_load_kernels(len(unfinished_inputs) * samples) and (
                 isolate or any(map(_can_be_loaded, unfinished_inputs))
             ):
-                # Load or compile the kernels before the workers start.
-                # The computing time of a robot then does not contain the compilation.
+                # If the kernels are loaded before the workers start, no robot's computing time contains a
+                # compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()

@@ -47,7 +47,7 @@ SPECIAL_SAMPLES = 3
 #: Minimum number of chunks of a robot with 200 or more samples, so that several workers can share the robot.
 _MIN_CHUNKS = 8
 #: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
-#: A chunk of this size takes about half a second for a robot with seven joints.
+#: For a robot with seven joints, 1000 configurations take about half a second.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -59,7 +59,7 @@ class Chunk:
     """A range of samples of one robot.
 
     Attributes:
-        first_draw: Index of the first draw.
+        first_draw: Index of the first group of `DRAW_SIZE` random configurations.
         samples: Number of random configurations.
         memory_limit: Allowed memory, bytes; None: half of the free memory.
     """
@@ -121,7 +121,7 @@ class Timings:
 class ChunkResult:
     """Result of one chunk, or the sum of several results.
 
-    `summary` is None without the first chunk of the robot.
+    `summary` is None if the robot's first chunk is not included.
     """
 
     name: str
@@ -250,7 +250,7 @@ class _FrameComparison(_Comparison):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches a compiled tree for all frames. A compiled tree for some frames is not cached.
+        # The robot caches only the compiled tree for all frames.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.magnitudes = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)

@@ -38,16 +38,15 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
-#: Maximum number of unanswered chunks: _CHUNKS_PER_THREAD * (threads of all workers) + _EXTRA_CHUNKS.
-#: Every thread then always has a next chunk.
+#: The maximum number of unanswered chunks is _CHUNKS_PER_THREAD for each thread, plus _EXTRA_CHUNKS.
+#: Therefore, every thread always has a next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe: a chunk can crash a child process of a Dask worker, but not the Dask worker.
 _MAX_TRIES = 20
 #: Seconds after which the number of workers is read again.
 _REFRESH_SECONDS = 1.0
-#: The scheduler does not need these packages.
-#: If the scheduler has one of the packages, its version must be the same as in this process.
+#: Packages that must have the same version as in this process. A scheduler may lack these packages.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _EMPTY_ROBOT_INPUT = RobotInput(b"", Origin(""))
 
@@ -66,8 +65,8 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
         tell: Function that receives messages for the user.
 
     Raises:
-        ClusterError: No scheduler answers, a worker cannot run urdfkin, or versions or code differ. Dask
-            opens a port for local workers.
+        ClusterError: No scheduler answers. A worker cannot run urdfkin, or has another version or other code.
+            Dask opens a port for local workers.
         InputError: N in `local:N` is not a whole number, or is below one.
     """
     with _connect_client(scheduler) as client:
@@ -96,8 +95,7 @@ def _connect_client(scheduler: str) -> Iterator[Client]:
             with client:
                 yield client
             return
-        # Delete the failed client in the thread that created the client.
-        # If another thread deleted the client, Dask would hang.
+        # Delete the client in this thread. Dask hangs if another thread deletes the client.
         gc.collect()
         key_hint = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
@@ -203,11 +201,11 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: For each sent chunk without an answer: its task, and how often the chunk was sent.
+        #: Sent chunks without an answer: the task, and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: For each robot, the future of its text. The workers store this text.
+        #: Futures of the texts that the workers store, by robot.
         self._robot_texts: dict[int, Future[bytes]] = {}
-        #: For each robot, the number of sent chunks without an answer.
+        #: Number of sent chunks without an answer, by robot.
         self._pending_counts = Counter[int]()
         self._limit, self._limit_time = _EXTRA_CHUNKS, float("-inf")
 

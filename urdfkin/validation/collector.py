@@ -31,7 +31,7 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
-        label: Name of the robot of the latest chunk; before the work, of the first robot.
+        label: Name of the robot of the latest chunk. Before the first chunk: name of the first robot.
     """
 
     robots_done: int
@@ -159,7 +159,7 @@ class _RobotAnswers:
 
     def make_report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
         # The report contains only results of chunks before the first failed chunk.
-        # The speed of the workers determines which later chunks are finished.
+        # Otherwise, the report would depend on the speed of the workers.
         last = min(self.failures, default=self.chunks.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -2,13 +2,13 @@
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. A mistake explains the whole result if
+results with the user's results. Each difference is divided by its scale. A mistake explains the whole result
+under this condition:
 
-    max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000,
+`max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000`
 
-where each difference is divided by its scale. If no mistake explains the whole result, the module looks for
-mistakes in single columns of a Jacobian, then for a mistake together with exchanged linear and angular rows.
-At most three mistakes are reported.
+If no mistake explains the whole result, single columns of a Jacobian are searched for mistakes. The last step
+combines each mistake with exchanged linear and angular rows. At most three mistakes are reported.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains the user's results if `DiagnosisCase.remainder` is at most this number.
+#: Largest `DiagnosisCase.remainder` of a mistake that explains the user's results.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
 #: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: A difference is divided by its scale, or by _MIN_SCALE * (largest scale) if this number is larger.
+#: A difference is divided by its scale. A scale is raised to at least _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
@@ -66,9 +66,12 @@ class DiagnosisCase:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return max |actual - predicted| / max |actual - expected|; each difference is divided by its scale.
+        """Return the part of the difference that a mistake does not explain.
 
-        Return inf if `predicted` is not finite, or if `actual` equals `expected`.
+        Each difference is divided by its scale. Return inf if `predicted` is not finite, or if `actual`
+        equals `expected`. Otherwise, return:
+
+        `max |actual - predicted| / max |actual - expected|`
 
         Args:
             predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.
@@ -120,8 +123,8 @@ def diagnose(mistakes: Mistakes, case: DiagnosisCase) -> list[str]:
     return []
 
 
-#: A common mistake: (sentence that describes the mistake, function without arguments).
-#: The function returns urdfkin's results with the mistake.
+#: A sentence that describes a common mistake, and a function.
+#: The function returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -266,7 +269,8 @@ class Mistakes:
         """Return the independent joints with one coordinate.
 
         Returns:
-            (name, index in q, index in v, is_angle) of each joint, in the function's convention.
+            A tuple (name, index in q, index in v, is_angle) for each joint. The indices are those of the
+            function's convention.
         """
         tree = self.robot.tree
         joints = []
@@ -285,9 +289,9 @@ class Mistakes:
     def _scale_joints(
         inputs: Inputs, indices: Sequence[tuple[int, int]], factor: float, count: int
     ) -> Inputs:
-        """Multiply some joints' entries in the first `count` of q, v and a by `factor`.
+        """Multiply the entries of some joints by `factor` in the first `count` of the inputs q, v and a.
 
-        `indices` contains (index in q, index in v and a) of each joint.
+        For each joint, `indices` contains its index in q, and its index in v and a.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):
@@ -429,7 +433,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _find_column_mistakes(mistakes: Mistakes, case: DiagnosisCase) -> Iterator[tuple[float, str]]:
-    """Yield (remainder, sentence) for each column with a simple mistake; the remainder is 0."""
+    """Yield the remainder 0 and a sentence for each column with a simple mistake."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

@@ -23,7 +23,7 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_NULL_MEANING = "null: a result is NaN, or two values with the bound 0 differ."
+_NULL_MEANING = "null: infinite, for example because a result is NaN."
 Units = Annotated[
     NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
 ]
@@ -79,15 +79,15 @@ class ReportedJoint(TypedDict):
     q: Annotated[
         int | None,
         doc(
-            "Index in q of the joint's first coordinate; for a mimic joint, index of the mimicked joint."
-            " null: none."
+            "Index in q of the joint's first coordinate. A mimic joint has the index of the mimicked joint."
+            " null: a fixed joint."
         ),
     ]
     v: Annotated[
         int | None,
         doc(
-            "Index of the joint's first entry in v and in a; for a mimic joint, index of the mimicked joint."
-            " null: none."
+            "Index of the joint's first entry in v and in a. A mimic joint has the index of the mimicked"
+            " joint. null: a fixed joint."
         ),
     ]
     limit: Annotated[ReportedLimit | None, doc("The joint's limits; null: the joint has no limits.")]
@@ -141,7 +141,7 @@ class ReportedFinding(TypedDict):
         doc("Severity of the finding. A file with an error is not compared with Pinocchio."),
     ]
     message: Annotated[str, doc("Description of the problem.")]
-    found: Annotated[str | None, doc("What was found, usually the wrong text in the file; null: none.")]
+    found: Annotated[str | None, doc("The text or value that caused the finding; null: none.")]
     remedy: Annotated[str | None, doc("How to correct the file; null: no remedy is known.")]
     file: Annotated[str, doc("Name of the file with the problem.")]
     line: Annotated[Count, doc("Line number of the problem, counted from 1.")]
@@ -204,24 +204,21 @@ class Chain(TypedDict):
     tip: Annotated[str, doc("Name of the chain's tip frame.")]
     standard: ReportedDHTable
     modified: ReportedDHTable
-    samples: Annotated[Count, doc("Number of compared configurations; 0: no comparison.")]
+    samples: Annotated[Count, doc("Number of compared configurations.")]
     metres: Annotated[
         float | None,
-        doc("Largest distance (metres) between a table's tip and Pinocchio's tip; null: no comparison."),
+        doc("Largest distance (metres) of a table's tip from Pinocchio's tip. null: nothing was compared."),
     ]
     worst: Annotated[
         Units,
         doc(
             "Largest disagreement of the tip's placement, Jacobian and acceleration of both tables, in eps"
-            " * scale. null: a result is NaN, two values with the bound 0 differ, or there is no comparison."
+            " * scale. null: infinite, or nothing was compared."
         ),
     ]
     bound_ratio: Annotated[
         float | None,
-        doc(
-            "Largest ratio of a disagreement to its bound. null: a result is NaN, two values with the bound"
-            " 0 differ, or there is no comparison."
-        ),
+        doc("Largest ratio of a disagreement to its bound. null: infinite, or nothing was compared."),
     ]
 
 
@@ -262,13 +259,17 @@ class Case(TypedDict):
     """The sample with the largest ratio of a disagreement to its bound."""
 
     sample: Annotated[
-        Count, doc("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
+        Count,
+        doc(
+            "Index of the sample. 0: the neutral configuration. 1: the lower limits. 2: the upper limits."
+            " Above 2: random configurations."
+        ),
     ]
     frame: Annotated[
         str,
         doc(
-            "Name of the frame (link:NAME or joint:NAME). If `subjects` is `joints` or `columns`: name of the"
-            " joint."
+            "Name of the frame (link:NAME or joint:NAME). It is the name of a joint if `subjects` is `joints`"
+            " or `columns`."
         ),
     ]
     disagreement: Units
@@ -287,7 +288,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """Number of results in which one library differs and the other two agree, for each of three libraries."""
+    """For each library, the number of results in which only this library differs from the others."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -307,8 +308,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of results that do not show which library is wrong. Either no two of the three libraries"
-            " agree, or one library agrees with the two others, and these two disagree."
+            "Number of results that do not show which library is wrong: none or two of the three pairs of"
+            " libraries agree."
         ),
     ]
 
@@ -328,13 +329,13 @@ class ReportedCheck(TypedDict):
     bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        doc("Smallest and largest bound of the results, in eps * scale; null and 0: nothing was compared."),
+        doc("Smallest and largest bound of the results, in eps * scale. [null, 0]: nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],
         doc(
-            "Number of results in each bin: below the first of `histogram_edges`, between two adjacent"
-            " edges, above the last edge."
+            "Number of results in each bin. The first bin is below the first of `histogram_edges`, and the"
+            " last bin is above the last edge."
         ),
     ]
     subjects: Annotated[
@@ -356,7 +357,7 @@ class ReportedTimings(TypedDict):
 
     read: Annotated[float, doc("Time of reading the file, and of building the models and tables.")]
     urdfkin: Annotated[
-        float, doc("Time of computing with urdfkin, and of loading or compiling its kernels in this time.")
+        float, doc("Time of computing with urdfkin. It includes the loading or compilation of kernels.")
     ]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
     compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
@@ -407,8 +408,8 @@ class ReportedRobot(TypedDict):
     model: Annotated[
         ReportedModel | None,
         doc(
-            "Links and joints. null: the file could not be read, or the robot's first chunk has no result."
-            " Then there are also no chains."
+            "Links and joints. null: unknown, for example because the file could not be read. Without links"
+            " and joints, there are no chains."
         ),
     ]
     findings: Annotated[list[ReportedFinding], doc("Findings of the linter in the robot's file.")]
@@ -421,7 +422,7 @@ class ReportedRobot(TypedDict):
         list[ReportedCheck], doc("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
     accuracy: Annotated[
-        ReportedAccuracy | None, doc("Result of the accuracy study; null without `--accuracy` or a result.")
+        ReportedAccuracy | None, doc("Result of the accuracy study; null if there is no result.")
     ]
 
 
@@ -436,8 +437,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds, without compilation before the first chunk. In a report"
-            " that `urdfkin report DIR` makes from a store: the sum of the robots' computing times."
+            "Wall time of the validation in seconds, without compilation before the first chunk. If `urdfkin"
+            " report DIR` makes the report from a store, the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]
@@ -457,7 +458,7 @@ class Document(Header):
 class ValidationVerdict(StrEnum):
     """Verdict on one robot.
 
-    HTML and Markdown reports list robots in the order of these members.
+    HTML and Markdown reports sort the robots by verdict, bad input first.
     """
 
     BAD_INPUT = "bad input"

@@ -1,13 +1,12 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks, and passes the answer of each task to a callback. The order of the answers does not
-matter: the collector sorts the answers, so no result depends on the engine. If the answer of a chunk is a
-`Failure`, an engine may skip the remaining chunks of the same robot. The engine must run all other chunks.
+An engine runs tasks, and passes the answer of each task to a callback. The collector sorts the answers, so no
+result depends on the engine or the order of the answers. If the answer of a chunk is a `Failure`, an engine
+may skip the remaining chunks of the same robot. The engine must run all other chunks.
 Tasks are created only when they are needed, so a million tasks take little memory.
 
 `WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker.
-If no robot is waiting, a free worker takes chunks of the least advanced robot: the index of its latest chunk
-is the lowest.
+If no robot is waiting, a free worker takes a chunk of the robot whose latest chunk has the lowest index.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks that are submitted to the executor and whose answers are not taken yet.
+#: Maximum number of submitted chunks without a processed answer.
 MAX_IN_FLIGHT = 512
 
 
@@ -41,7 +40,7 @@ AnswerCallback = Callable[[Task, Answer], None]
 class Engine(Protocol):
     """Interface of an engine.
 
-    If `Engine.run` raises an exception, `validate` runs no further task. Its report contains the answers that
+    If `Engine.run` raises an exception, `validate` runs no further task. The report contains the answers that
     the callback has received.
     """
 

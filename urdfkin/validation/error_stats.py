@@ -1,8 +1,8 @@
 """Error statistics of a validation.
 
 The statistics of several chunks, processes and machines can be added. The addition is commutative and
-associative. Therefore, the sum does not depend on the division of the samples into chunks. The sum of two
-statistics contains the worse of the two worst cases.
+associative. Therefore, the sum does not depend on the division of the samples into chunks. The worst case of
+a sum is the worst case of its terms.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
@@ -29,7 +29,7 @@ CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
 
 @dataclass(frozen=True, slots=True)
 class OraclePair:
-    """Comparison of one library with the second oracle.
+    """Comparison of urdfkin or Pinocchio with the second oracle.
 
     Attributes:
         worst: Largest disagreement, in eps * scale.
@@ -53,7 +53,8 @@ class CrossCheck:
 
     Attributes:
         by: Name of the second oracle.
-        alone: Number of results in which only one library differs, for each of `CROSS_CHECKED_LIBRARIES`.
+        alone: For each of `CROSS_CHECKED_LIBRARIES`, the number of results in which only this library
+            differs from the others.
     """
 
     by: str
@@ -202,10 +203,10 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return the upper edge of the percentile's bin, but at most `worst`; 0.0 for the first bin.
+    """Return the upper edge of the bin that contains a percentile.
 
-    The error is at most the width of the bin. The result for the last bin, which has no upper edge, is the
-    last edge.
+    The result is at most `worst`. It is 0.0 for the first bin, and the last edge for the last bin. The error
+    is at most the width of the bin, except in the last bin.
     """
     counts = np.cumsum(histogram)
     if not counts[-1]:
@@ -229,8 +230,8 @@ def compute_error_stats(
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
     `frames` are the names of the frames, joints or columns. `first_sample` is the index of the first sample
-    within the robot. `inputs` contains q, v and a of each sample. If the factor k of the bound is not finite
-    or not positive, no result is within the bound.
+    within the robot. `inputs` contains q, v and a of each sample. Every result fails unless the factor k of
+    the bound is finite and positive.
     """
     n, count = results.shape[:2]
     if not results.size:

@@ -1,9 +1,9 @@
 """Compare a user's function with urdfkin and the oracle.
 
-The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. The allowed difference
-is a derived bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with
-urdfkin, the error is in the function.
+The user's function computes a quantity from q, from q and v, or from q, v and a. The function is called at
+random configurations, at the zero configuration and at the joint limits. The allowed difference is a derived
+bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with urdfkin, the error
+is in the function.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: The function's inputs: q, or q and v, or q, v and a.
-        bound: Largest allowed difference of each number: bound on rounding errors * `FunctionCheck.factor`.
+        bound: Allowed difference of each number: the bound on rounding errors times `FunctionCheck.factor`.
         replay: A command or a line of Python that computes the expected result.
     """
 
@@ -106,15 +106,14 @@ class FunctionCheck(Displayable):
         compared: Number of results that are real numbers in the right shape, NaN included.
         factor: Number by which each bound is multiplied.
         eps_scale: Largest difference in multiples of eps * scale.
-        bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference
-            bound * factor. The ratio is at most 1 if all results agree.
-        oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of bound * factor. None
-            without an oracle.
-        rows: The dictionary {name of the row: `bound_ratio` of the row}, for example {"vx": 0.2}.
-        columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for a
-            result without such columns, for example a placement.
-        worst: The worst result; None if no result was compared, or if the results contain no numbers (a
-            Jacobian of a robot without moving joints).
+        bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference. The
+            ratio is at most 1 if all results agree.
+        oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of the allowed
+            difference. None without an oracle.
+        rows: The `bound_ratio` of each row, for example {"vx": 0.2}.
+        columns: The `bound_ratio` of each column of a Jacobian. The keys are names of joint velocities. Empty
+            for a result without such columns, for example a placement.
+        worst: The worst result; None if no number was compared.
         errors: Number of configurations with an exception, or without real numbers in the right shape.
         first_errors: At most five exceptions and invalid results, with messages.
         diagnoses: Possible causes of the differences: mistakes in the function, rounding, or results that are
@@ -265,9 +264,8 @@ def verify_function(
     The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
     quantities, and v (nv,) and a (nv,) for some quantities. Without `convention`, the units are rad, m and s.
     The values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An
-    exception or a result of wrong shape does not end the check. The check reports the exceptions and wrong
-    shapes.
+    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect.
+    Exceptions and wrong shapes are reported, and do not end the check.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -284,8 +282,8 @@ def verify_function(
             for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
             errors. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared
             results agree with urdfkin's.
-        batch: If True, the function computes n configurations in one call, and returns n results. The shapes
-            of the inputs are then (n, nq) for q, and (n, nv) for v and a.
+        batch: If True, the function computes n configurations in one call, and returns n results. The
+            function receives q (n, nq), v (n, nv) and a (n, nv).
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
 
@@ -343,7 +341,9 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """Results for a batch of configurations, of which n have a valid result of the user's function.
+    """Results for a batch of configurations.
+
+    The user's function returned a valid result for n of these configurations.
 
     Attributes:
         first: Index of the batch's first configuration in the whole check.
@@ -521,10 +521,8 @@ class _Run:
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Convert the scale of a bound from urdfkin's convention to the convention of the user's function.
 
-        Jacobians, after the rows are reordered:
-
-            converted result = result @ inverse
-            converted scale = scale @ |inverse|
+        After its rows are reordered, a Jacobian is multiplied from the right by `conversion.inverse_matrix`.
+        The scale is multiplied by the absolute values of this matrix.
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
@@ -549,12 +547,12 @@ class _Run:
     def _compute_conversion_k(self, q: FloatArray) -> float:
         """Return k; the rounding error of the conversion is at most k * eps * scale.
 
-        Reordering has no rounding errors. Computed angles, for example degrees from radians, are rounded:
+        Reordering has no rounding errors. If angles are converted, for example from radians to degrees:
 
-            error of an angle and of its rotation matrix <= 2 eps |q|
-            error of a vector <= sum of the errors of all rotation matrices
-            term of a result: product of `factors` vectors
-            velocity conversion of a planar or floating joint: <= 16 eps
+        - The error of an angle and of its rotation matrix is at most 2 eps |q|.
+        - The error of a vector is at most the sum of the errors of all rotation matrices.
+        - A term of a result is a product of `row.factors` vectors.
+        - The velocity conversion of a planar or floating joint has an error of at most 16 eps.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None

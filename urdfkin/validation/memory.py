@@ -4,10 +4,9 @@ Frames are compared in blocks, to limit the memory. The largest arrays are the J
 samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
 results do not depend on the other frames.
 
-The `jobs` local processes together use at most half of the memory that is free at the start, in equal parts.
-A process of an executor uses at most half of the memory that is free on its machine. If a robot needs more
-memory than one process may use, the robot is not verified. The report then states the needed and the allowed
-memory.
+Local processes share half of the memory that is free at the start in equal parts. A process of an executor
+uses at most half of the free memory of its machine. If a robot needs more memory than one process may use,
+the robot is not verified. Its report states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ from urdfkin.model.tree import KinematicTree
 MAX_BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FREE_FRACTION = 0.5
-#: Measured: Pinocchio 4.1.0 needs _BYTES_PER_NV_CUBED * nv^3 bytes for its workspace, and
-#: _BYTES_PER_LINK bytes for each link.
+#: Measured memory of Pinocchio 4.1.0. Its workspace is proportional to nv^3.
 _BYTES_PER_NV_CUBED, _BYTES_PER_LINK = 64, 24_000
 #: Maximum number of arrays in memory at the same time; each contains the results of a block of frames.
 _MAX_ARRAYS = 12
@@ -45,9 +43,9 @@ def frame_array_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, item_bytes: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `MAX_BLOCK_BYTES`, or of one item.
+    """Divide `count` items into slices of at most `MAX_BLOCK_BYTES`.
 
-    For zero items, yield one empty slice.
+    A larger item gets its own slice. For zero items, yield one empty slice.
     """
     items = max(1, MAX_BLOCK_BYTES // item_bytes)
     for start in range(0, max(1, count), items):
@@ -79,7 +77,7 @@ def check(tree: KinematicTree, samples: int, allowed_bytes: int | None) -> None:
 
 
 def _find_free_bytes() -> Iterator[int]:
-    """Yield the free memory (bytes) of the machine, of each control group, and below the limit RLIMIT_AS."""
+    """Yield the free memory (bytes) under each limit: of the machine, of a control group, RLIMIT_AS."""
     for line in _read_lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024

@@ -13,10 +13,10 @@ contains neither the values of locked joints nor the root joint. The answer is o
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
-The program runs with the rights of the user who starts it. If the program hangs, ends or gives an answer of
-another form, the call for this configuration raises `ProgramError`, and the program is stopped. The call for
-the next configuration starts the program again. After three consecutive failures, the program is not started
-again. An answer with the entry `error` raises `ProgramError`, but does not stop the program.
+The program runs with the rights of the user who starts it. If the program hangs, ends or gives an invalid
+answer, the call raises `ProgramError` and stops the program. The next call starts the program again. After
+three consecutive failures, the program is not started again. An answer with the entry `error` raises
+`ProgramError`, but does not stop the program.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum length of a quoted text: bytes of the program's standard error, or characters of `error`.
+#: Maximum length of an error text of the program in a message.
 _MAX_ERROR_BYTES = 300
 #: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
@@ -69,7 +69,7 @@ class Program:
         timeout: Longest time for an answer, in seconds; at most a day.
 
     Raises:
-        InputError: an empty command, or a timeout that is not positive or is above a day.
+        InputError: the command is empty, or the timeout is not between 0 and one day.
         SourceError: the program cannot be started.
 
     >>> import urdfkin
@@ -140,8 +140,8 @@ class Program:
         """Return the program's result for one configuration.
 
         Raises:
-            ProgramError: the program ended, took too long, or answered with an error or without a result.
-                Also raised, without a call, if the program failed for the three preceding configurations.
+            ProgramError: the program ended, took too long, or gave no result. After three consecutive
+                failures, the program is not called again.
             SourceError: the program cannot be started again.
         """
         if self._failures >= _MAX_FAILURES:
@@ -233,7 +233,7 @@ class Program:
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Raise ProgramError unless the answer has a `result`, or an `error` that is a text."""
+        """Return the answer. Raise ProgramError if it has neither a `result` nor a text as `error`."""
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):

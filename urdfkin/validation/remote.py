@@ -21,7 +21,7 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run` for a chunk: a word and data.
+#: Return value of `run`: the outcome of a chunk, and data.
 #: "answer": The data are the pickled answer of the chunk.
 #: "died": The chunk crashed two processes.
 #: The data are a text with the signal or exit status of the second crash.
@@ -48,7 +48,7 @@ def store_robot(robot: bytes) -> bytes:
 def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
     """Run a pickled chunk in a worker process; after a crash, try a new process.
 
-    If the versions or digests differ from the client's, the chunk is not run.
+    The chunk is not run if the client has other versions or digests.
     """
     if client_provenance != provenance():
         return "other code", provenance()
@@ -68,11 +68,11 @@ def end_idle() -> None:
 
 
 class _CrashError(Exception):
-    """The text is the signal or exit status of the crashed process."""
+    """A process crashed. The message is its signal or exit status."""
 
 
 class _Parcel:
-    """A pickled robot and a pickled chunk, which the receiver unpickles as one `Chunk`."""
+    """A pickled robot and a pickled chunk. The receiver unpickles one `Chunk`."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 #: Packages that display results, but compute no results.
-#: A campaign can resume after a change of these packages.
+#: A campaign can resume if only the code of these packages has changed.
 _DISPLAY_PACKAGES = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
@@ -176,7 +176,7 @@ class ValidationReport(Displayable):
         interrupted: Whether the run ended early. Finished results are included.
         library_versions: Package versions of the run. None: the installed versions.
         studies: Results of the accuracy study, one for each compared robot. Empty if no study was requested.
-            An element is None if the robot's study failed or is missing.
+            The result of a robot is None if its study failed or is missing.
     """
 
     robots: tuple[RobotReport, ...]
@@ -233,7 +233,7 @@ class ValidationReport(Displayable):
 
     @property
     def passed(self) -> bool:
-        """Whether every requested robot was verified without interruption; False without a robot."""
+        """Whether every requested robot was verified without interruption. False if there is no robot."""
         return self.outcome.passed
 
     @property

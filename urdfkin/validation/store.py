@@ -15,9 +15,8 @@ the sha256 of all data on which the chunk's numbers depend. Therefore, results o
 are never reused.
 
 Files are written atomically, so a file is either complete or absent. A file's name contains the key of its
-chunk. The store reports damaged files, and files that belong to no chunk of the validation. A store that is
-open for writing also moves the reported files to the folder `damaged/`. The results in a damaged file are
-computed again.
+chunk. The store reports damaged files, and files that belong to no chunk of the validation. A writable store
+moves these files to the folder `damaged/`. The results in a damaged file are computed again.
 """
 
 from __future__ import annotations
@@ -220,8 +219,8 @@ class Store:
     def check_names(self) -> None:
         """Report files with unknown names; a writable store moves them to `damaged/`.
 
-        Results of the accuracy study are not reported: their names depend on settings that the manifest does
-        not contain.
+        Results of the accuracy study are not checked, because their names depend on settings outside the
+        manifest.
         """
         keys = (
             self.manifest.key(robot, index)
@@ -237,7 +236,7 @@ class Store:
         """Count the chunks with a stored result, for each robot.
 
         Returns:
-            {robot: (number of chunks with a result, whether a chunk failed)}.
+            For each robot: the number of chunks with a result, and whether a chunk failed.
         """
         names = {path.name for kind in (_DONE, _FAILED) for path in self._find_files(kind)}
         counts = {}
@@ -454,7 +453,7 @@ def _acquire_lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_LOCK_ATTEMPTS):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # `Store.writing_process` in another process may hold the lock for a moment.
+        time.sleep(0.1)  # A reader of the store holds the lock for a moment in `Store.writing_process`.
     raise InputError(
         "another process uses this store",
         where=str(folder),
@@ -492,7 +491,7 @@ class FailedStudy:
 class StudySettings:
     """Settings of the accuracy study.
 
-    With `moving_base`, the root link has a random motion in each sample; otherwise, it is fixed.
+    With `moving_base`, the root link has a random motion in each sample. Otherwise, the root link is fixed.
     """
 
     samples: int
