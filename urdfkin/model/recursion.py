@@ -110,7 +110,7 @@ class Recursion:
         return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
-        """`rates`: linear and angular joint velocity, then joint acceleration, in the child link's axes."""
+        """`rates` has the linear and angular velocity and acceleration of the joint, in the child's axes."""
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
         return replace(
@@ -196,8 +196,8 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
         """Yield the derivatives of the columns.
 
-        The tuples are (i, j, factor, x), where i and j are indices of v.
-        For each i and j, the sum of factor * x is d(column i)/dq_j.
+        The tuples are (i, j, factor, x), where i and j are indices of v. The derivative of column i with
+        respect to q_j is the sum of factor * x over all tuples with these indices.
         """
         point = ZERO if reference.at_world else s.p
         computed = [(one, self._column(one, point)) for one in columns]

@@ -39,11 +39,9 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 #: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
 #: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: Maximum number of changes between runs on the HTML page.
-#: The page lists the latest changes first.
-#: A terminal shows at most this number of runs, and at most this number of changes.
-#: On a terminal, the option --all removes the limit.
+#: Maximum number of runs, and of changes, on a terminal without the option --all.
 MAX_SHOWN = 20
+#: Maximum number of changes between runs on the HTML page, which lists the latest changes first.
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot.
 #: The key "" is for a run whose report does not contain the robot.

@@ -113,7 +113,7 @@ def _length_and_angle(metres: float, radians: float) -> str:
 def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
     """Describe the largest distance and the largest angle between matching frames.
 
-    The text contains no distance and no angle that rounding errors can explain.
+    The text omits a distance or an angle that rounding errors can explain.
     """
 
     def largest_value(attribute: str) -> float:
@@ -138,7 +138,7 @@ def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float
 def _describe_distance(frame: Interval, rounding: tuple[float, float]) -> str:
     """Describe the distance and the angle between two matching frames.
 
-    The text contains no distance and no angle that rounding errors can explain.
+    The text omits a distance or an angle that rounding errors can explain.
     """
     parts = (
         [interval_text(length, frame.lower, frame.upper)]
@@ -160,7 +160,8 @@ def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
     The table shows the distances after the changes of model B in `sameness.after`. The verdict "same up to
-    single precision" is about the unchanged models. After this verdict, the heading lists the changes.
+    single precision" is about the unchanged models. If a report has this verdict, the heading lists the
+    changes.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""

@@ -98,8 +98,8 @@ class Robot(Displayable):
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`. For `v`
       and `a`, the only pose is `"neutral"`: all zeros.
 
-    A text that begins with the name of a pose needs only the values that differ from the pose. Every other
-    text, and every mapping, must contain a value for every coordinate.
+    A text that begins with the name of a pose needs only the values that differ from the pose. All other
+    texts and all mappings must contain every coordinate.
 
     Methods that compute a quantity share these arguments:
 
@@ -1197,8 +1197,8 @@ class Robot(Displayable):
         """Return the contributions of each joint to a frame's classical acceleration (eq. 7.125, 7.130).
 
         A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. A moving `base`
-        has one contribution. The sum of all contributions is the result of `acceleration`. The check compares
-        this sum with Pinocchio's acceleration.
+        has one contribution. The sum of all contributions is the result of `acceleration`, which the check
+        compares with Pinocchio's acceleration.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.

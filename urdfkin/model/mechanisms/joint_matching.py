@@ -314,8 +314,8 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
             yield candidate
 
 
-#: Below this sine of the angle between two axes, an error of one axis moves the nearest points of the axes by
-#: more than 100 times the error.
+#: Two axes are nearly parallel if the sine of their angle is below this value. An error of one axis can move
+#: the nearest points of nearly parallel axes by more than 100 times the error.
 _NEARLY_PARALLEL_SINE = 1e-2
 
 
@@ -624,9 +624,9 @@ class SubtreeMatcher:
         return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of A's joint e can move B from the pose X to `other`.
+        """Return whether B's poses X and `other` differ only by a motion of A's joint e.
 
-        For a planar joint, the result is true only if X equals `other`.
+        For a planar joint, the poses must be equal.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:

@@ -473,8 +473,8 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N in P_b = M P_a N; see the module `mechanism`.
 
-        `compensation` is one possible N of a planar joint, and None for a floating joint.
-        `pose_a` includes `motion_a`.
+        `compensation` is one possible N of a planar joint. A floating joint has the value None. `pose_a`
+        includes `motion_a`.
         """
         yield IDENTITY if compensation is None else compensation
         candidates = [next_pair.motion_b]

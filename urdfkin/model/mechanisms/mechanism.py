@@ -11,7 +11,9 @@ different frames for the joint. The constant rigid motion M describes this diffe
 different frames for the body after the joint. The constant rigid motion N describes this second difference. A
 and B move in the same way if
 
-    P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
+    P_b = M P_a N.
+
+If the joint is reversed in one model, P_a^-1 replaces P_a.
 
 For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses, which are
 translations and rotations in the joint's plane. Therefore, M P N must be a planar pose for every planar pose
@@ -81,7 +83,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
     The motion contains no rotation about the axis, and no shift along the axis.
 
     Returns:
-        (4, 4) motion, its tilt (rad), and its shift (m), which is 0 for prismatic joints.
+        (4, 4) motion, tilt (rad) and shift (m). The shift is 0 for prismatic joints.
     """
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
@@ -314,7 +316,7 @@ class Mechanism:
     def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy of the mechanism with the joints `names` in this order.
 
-        `allows_order` must be true. A link is omitted if its pose depends on the order.
+        `allows_order` must be true. The copy omits a link if different joints move it in the new order.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -330,7 +332,7 @@ class Mechanism:
         return other
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the joints give the same motion in the order `names`.
+        """Return whether the robot moves in the same way with its joints in the order `names`.
 
         The result is false if the joints are not consecutive.
         """
@@ -592,7 +594,7 @@ class Alignment:
 
     @property
     def has_free_frames(self) -> bool:
-        """Whether A or B is made of a Denavit-Hartenberg table, so that its frames follow a convention."""
+        """Whether a convention chooses the frames of A or B, as in a Denavit-Hartenberg table."""
         return self.a.free_frames or self.b.free_frames
 
     @property
@@ -775,7 +777,8 @@ class Variables:
             joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
         rule_differences: Indices of the joint pairs with different mimic rules.
-        coordinates_b: Function of a variable for each coordinate of B. The keys are the names of B's joints.
+        coordinates_b: Functions that compute B's coordinates from the variables. The keys are the names of
+            B's joints.
     """
 
     pairs: tuple[MatchedValues | None, ...]

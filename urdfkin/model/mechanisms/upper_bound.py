@@ -357,8 +357,8 @@ def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after a joint's motion and L."""
-    # A planar or floating joint rotates d without limits, and a floating joint to every direction.
-    # Therefore, h(u) = |u| max |d| is an upper bound on the new support function of d.
+    # A planar or floating joint can rotate d by any angle. Therefore, h(u) = |u| max |d| is an upper bound on
+    # the new support function of d.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -642,7 +642,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a copy of a step without translations; a translation does not change a free vector."""
+    """Remove the translations of a matched joint, because a translation does not change a free vector."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
@@ -652,7 +652,7 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 def relevant_joints(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints that affect the length of D, with their values.
+    """Return the matched joints that affect the length of D, and the values of these joints.
 
     The result begins at the first joint that differs, or at an earlier joint that has the same variable as a
     later joint of the result.
