@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _DISPLAY_UNITS = DisplayUnits(digits=6)
 
-#: The heat map shows ratios of disagreement to bound. The colour changes at each of these ratios.
+#: Ratios of disagreement to bound at which the colour of the heat map changes.
 HEAT_EDGES = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 

@@ -275,7 +275,7 @@ def _check(
 def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
 
-    `bound_ratio` must lie between two quotients: `worst` / largest bound, and `worst` / smallest bound.
+    `bound_ratio` is at least `worst` / largest bound, and at most `worst` / smallest bound.
     """
     ratio, largest = _none_as_infinity(check["bound_ratio"]), _none_as_infinity(check["worst"])
     low, high = _none_as_infinity(check["bound"][0]), _none_as_infinity(check["bound"][1])

@@ -187,8 +187,8 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text contains the nonzero coordinates of model A. A joint of model B may have no matching independent
-    joint in model A. The text also contains the nonzero coordinate of this joint of B.
+    The text contains the nonzero coordinates of model A. The text also contains the nonzero coordinates of
+    those joints of model B that match no independent joint of model A.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -434,12 +434,11 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    Without `worst`, A is in its zero configuration, and B is in the matching configuration
-    `sameness.to_b(q_a)`. If `written` is True, model B has the base pose in the file of B. If `written` is
-    False, model B has the base pose `sameness.base`, which brings model B closest to model A. Each line
-    segment is four numbers: x and y of the start point, and x and y of the end point. Each picture has the
-    lines of A and the lines of B. In the enlarged picture, another line connects the origins of the worst
-    frame in A and in B.
+    If `worst` is None, A is in its zero configuration, and B is in the matching configuration. If `written`
+    is True, model B has the base pose in the file of B. If `written` is False, model B has the base pose
+    `sameness.base`, which brings model B closest to model A. Each line segment is four numbers: x and y of
+    the start point, and x and y of the end point. Each picture has the lines of A and the lines of B. In the
+    enlarged picture, another line connects the origins of the worst frame in A and in B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()

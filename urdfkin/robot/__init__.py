@@ -713,9 +713,9 @@ class Robot(Displayable):
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
-            joints: The joints that remain movable; all other joints are locked. A locked joint without a
-                value in `lock` is at 0. If `lock` begins with the name of a pose, such as "ready", this joint
-                is at the pose's value instead.
+            joints: The joints that remain movable; all other joints are locked. If `lock` begins with the
+                name of a pose, such as "ready", the pose contains the missing values. Otherwise, the missing
+                values are 0.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -1412,8 +1412,9 @@ class Robot(Displayable):
 
         Args:
             frame: As in `export`.
-            quantities: As in `export`. A call of the module returns the quantity with the fewest inputs. If
-                several quantities have the fewest inputs, the call returns the first of these quantities.
+            quantities: As in `export`. A call of the module returns the quantity with the fewest of the
+                inputs q, v and a. If several quantities have equally few inputs, the call returns the first
+                of these quantities.
             reference: As in `export`.
             verify: As in `export`.
 
@@ -1506,9 +1507,9 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the last row ends at the tip if its four parameters suffice. "flange": the last row
                 ends on the last joint axis, and the tool transform leads from this axis to the tip.
-            parallel_offset: Rule for the offsets d along consecutive parallel axes. "last": the row of the
-                last of these axes contains the sum of the offsets. "first": the row of the first of these
-                axes contains the sum of the offsets. "each": each row contains the offset of this row's link.
+            parallel_offset: Row for the sum of the offsets d along consecutive parallel axes. "last": the row
+                of the last axis. "first": the row of the first axis. "each": no sum, each row contains the
+                offset of its own link.
             flip: Names of joints whose positive direction is reversed in the table.
             first: "base": d_1 and theta_1 contain the offset along the first axis and the rotation about this
                 axis. "joint": d_1 and theta_1 are 0, and the table's base transform contains the offset and
@@ -1530,8 +1531,8 @@ class Robot(Displayable):
 
         Raises:
             UnknownNameError: a frame or a joint does not exist.
-            InputError: an option has an invalid value, `like` excludes an option or describes a different
-                robot, or the path contains a planar or floating joint.
+            InputError: an option has an invalid value; `like` excludes an option; `like` describes a
+                different robot; the path contains a planar or floating joint.
             RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
             TableError: Pinocchio's placements differ by more than the bound.
 

@@ -6,8 +6,8 @@ equal labels. By default, a link's label is the link's name. Third, the remainin
 paired by geometry, the most similar joints first.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. With these zero offsets, links with equal labels must also coincide. The multipliers
-of the mimic rules must correspond; the method `SubtreeMatcher.ignore_mimic_rules` removes this condition.
+the other subtree. The zero offsets must also make links with equal labels coincide. The multipliers of the
+mimic rules must correspond; the method `SubtreeMatcher.ignore_mimic_rules` removes this condition.
 
 The value of the joint before a subtree does not matter, because the joint's zero offset can compensate any
 value. Therefore, the result of a comparison depends on two things only: the two joints before the subtrees,
@@ -430,9 +430,9 @@ def _first_revolute_axes(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """For each branch of A with each branch of B, return the first revolute axes of both branches.
 
-    A pair is an axis of A and an axis of B.
-    Each item is (revolute pair, prismatic pairs before this pair, pairs from `later_axes`).
-    If the branches have no revolute pair, the first entry is the last prismatic pair.
+    A pair is an axis of A and an axis of B. Each item contains a revolute pair, the prismatic pairs before
+    the revolute pair, and the pairs from `later_axes`. If the branches have no revolute pair, the last
+    prismatic pair replaces it.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -475,7 +475,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None)
 
 #: Function that proposes poses of the next body of B.
 #: The first argument contains the next bodies of A and B.
-#: The second argument is one joint of A and one joint of B: the joints before the next bodies.
+#: The second argument contains A's joint before its next body, and B's joint before its next body.
 #: The third argument is the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 

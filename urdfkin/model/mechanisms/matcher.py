@@ -61,8 +61,8 @@ MAX_EXACT_SEARCH_DEPTH = 200
 #: If several choices at a joint are equally good, the joints after this joint decide.
 #: The matcher compares at most this number of joints on each branch.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root that the search for an exact match computes from axes and tries.
-#: The number applies to each pair of first bodies.
+#: The search for an exact match computes poses of B's root from axes.
+#: For each pair of bodies where the search starts, the search uses at most this number of poses.
 MAX_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
 #: For equal numbers, a score with a much smaller difference (m) is better.
@@ -77,10 +77,9 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """The number of comparisons that remain for decisions between equally good choices at a joint.
+    """A limit on the comparisons that decide between equally good choices at a joint.
 
-    To decide, a matcher compares joints of A with joints of B, farther along the two trees. Several matchers
-    can share this number.
+    A matcher compares later joints of A with later joints of B. Several matchers can share a limit.
 
     Attributes:
         remaining: Number of joint pairs that may still be compared.
@@ -94,13 +93,13 @@ class BodyPair:
     """A body of A and the corresponding body of B.
 
     Attributes:
-        via: The joints of A and of B before the bodies; None at the first bodies.
-        previous: Index in `Alignment.steps` of the joint pair before the bodies.
-            -1 at the first bodies, in `_score_ahead` and in `_poses_after`.
+        via: The joints of A and of B before the bodies. None for the bodies at which the search starts.
+        previous: Index in `Alignment.steps` of the joint pair before the bodies. -1 if `Alignment.steps` does
+            not contain such a pair.
         motion_a: (4, 4) motion G, the product of the motions L at earlier joints.
-        motion_b: (4, 4) motion of B's body due to the root pose, and due to earlier zero offsets and
-            conversions. The matcher compares motion_a @ (zero pose of A's link) with motion_b @ (zero pose of
-            B's link).
+        motion_b: (4, 4) motion of B's body. The root pose, earlier zero offsets and earlier conversions
+            determine this motion. The matcher compares motion_a @ (zero pose of A's link) with
+            motion_b @ (zero pose of B's link).
     """
 
     bodies: tuple[int, int]
@@ -578,7 +577,7 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_OffsetOrPose, BodyPair]], depth: int
     ) -> tuple[_OffsetOrPose, BodyPair, Score]:
-        """Return the choice for which most links and axes agree.
+        """Return the zero offset or the pose with the most agreeing links and axes.
 
         Later joints decide between equally good choices. For example, perpendicular axes that intersect
         allow two poses of B, so a third axis decides.
@@ -592,7 +591,7 @@ class MechanismMatcher:
                 continue
             score = self._score(body_pair)
             scored.append((choice, body_pair, score))
-            # If all axes and links agree, no other choice can agree better.
+            # All axes and links agree, so the remaining choices cannot be better.
             if not score[1] and self.joint_matcher.link_pairs(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
@@ -678,7 +677,7 @@ def _best_of(
 
 
 def _is_better_alignment(one: Alignment, than: Alignment) -> bool:
-    # The frames of a table are free, so its links decide only between alignments with equal joints.
+    # A convention chooses the link frames of a table, so the agreement of the joints comes first.
     if one.has_free_frames and one.all_joints_agree != than.all_joints_agree:
         return one.all_joints_agree
     return is_better(one.score, than.score)
@@ -858,8 +857,8 @@ def _best_alignment(
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Allowed difference between a computed zero offset and the zero offset of a mimic rule,
-#: as a multiple of the angle tolerance. A zero offset that is computed from the axes of the joint
-#: and of a later joint is inexact if the two axes are nearly the same line.
+#: as a multiple of the angle tolerance.
+#: A computed zero offset is inexact if the axes of the joint and of a later joint nearly coincide.
 OFFSET_TOLERANCE_FACTOR = 1e4
 
 
@@ -879,7 +878,7 @@ class _RulePair:
         slope_b: n
         constant_b: d
         offset: o
-        is_free: True if no later link or axis determines o. Then o can have any value.
+        is_free: Whether o can have any value, because no later link or axis determines o.
         has_effect: Whether the joint moves matched links or later axes.
     """
 
@@ -917,8 +916,8 @@ def zeros_by_mimic_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[
     zeros = dict[str, tuple[int, float]]()
     for rules in _group_rule_pairs(alignment):
         alphas = [rule.slope_a / rule.slope_b for rule in rules if rule.slope_b]
-        # Rules of a joint pair: y = alpha x + beta, with the coordinates x of A and y of B.
-        # Only the joint pairs with the most frequent alpha get a new zero offset.
+        # The rules of a joint pair require y = alpha x + beta for the coordinates x of A and y of B.
+        # Joint pairs can differ in alpha, so only the pairs with the most frequent alpha get a new offset.
         alpha = max(
             alphas, key=lambda one: sum(_are_close(one, other, tolerance) for other in alphas), default=0.0
         )

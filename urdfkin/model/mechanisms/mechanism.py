@@ -165,10 +165,7 @@ class FreeJointConversion:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid motions, and the joint can reach M P N.
-
-        The method checks two poses P.
-        """
+        """Check that M and N are rigid motions, and that the joint can reach M P N for two poses P."""
         if not all(is_joint_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _TEST_COORDINATES)
@@ -647,7 +644,7 @@ class Alignment:
         """Yield sets of two joint pairs that can exchange their partners.
 
         Both pairs have the same kind and the same previous pair.
-        Each pair of the set differs, or a joint pair or link pair after it on a path from the base differs.
+        Each pair is on the path from the base to a joint pair or link pair that differs.
         In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)

@@ -12,9 +12,9 @@ urdfkin computes h joint by joint along the chain, without a search over joint v
 
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
 s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For all rotations R in the range
-of a joint, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon is at
-one of its corners. At each joint, the interpolated h can be larger than the true h. The relative difference
-is proportional to the square of the distance between grid points.
+of a joint, the vectors R^T u form an arc. urdfkin encloses the arc in a polygon. A convex function is largest
+at a corner of a polygon. At each joint, the interpolated h can be larger than the true h. The relative
+difference is proportional to the square of the distance between grid points.
 
 **Recursion.** At joint i:
 
@@ -164,10 +164,11 @@ class Support:
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return h after the rotation of the set of points by each of the angles.
 
-        The axis of the rotation contains the origin.
+        The axis of the rotation contains the origin. The value at a grid point is:
 
-            result:             h(along + factor R^T across)
-            along + across:     a grid point's parts along and perpendicular to the axis
+            h(along + factor R^T across)
+
+        The vectors `along` and `across` are the grid point's parts parallel and perpendicular to the axis.
 
         Args:
             axis: Unit vector.
@@ -253,9 +254,9 @@ def upper_bounds(
     The bounds hold for all joint values within the limits.
 
     Returns:
-        Distance (m) and angle (rad).
-        Both are 0 if nothing differs on the path. A result is inf if no bound is proven.
-        Matched moving joints of different kinds give inf.
+        Bounds on the distance (m) and on the angle (rad). The bounds are 0 if nothing on the frame's path
+        differs. A bound is inf if no bound is proven, for example if moving joints of different kinds are
+        matched.
     """
     steps, pairs = joints_from_first_difference(alignment, variables, frame)
     if not steps and frame.constant_motion is IDENTITY:
@@ -276,7 +277,7 @@ def upper_bounds(
 def joints_from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints on the path to a frame, from the first difference on, and their values."""
+    """Return the matched joints from the first difference to a frame, and the values of these joints."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -402,10 +403,8 @@ def _prismatic_difference(
 ) -> Support:
     """Return the support function of p' - p for two matched prismatic joints.
 
-        p  = t u:     translation by A's joint
-        p' = t' u':   translation by B's joint
-
-    The difference is largest if each joint value is at a limit.
+    A's joint translates by p = t u, and B's joint translates by p' = t' u'. The difference is largest if each
+    joint value is at a limit.
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
