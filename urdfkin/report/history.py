@@ -383,7 +383,7 @@ def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
 
 
 def list_changes(history: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes between runs, each in a pair with the index of the later run.
+    """Return all changes between runs. Each change has the index of the later run.
 
     The changes of the latest run come first. Within a run, regressions come before other changes.
     """

@@ -34,7 +34,6 @@ from urdfkin.robot import Robot
 #: Maximum number of printed lines for each kind of difference.
 #: The option --all removes the limit.
 MAX_LINES = 12
-#: Message for models that are not the same, if joint names or orders differ.
 MATCHED_BY_AXES = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
@@ -62,7 +61,7 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
         bound = _length_and_angle(*sameness.bound_as_written)
         off = f"in every configuration no frame is off by more than {bound}"
     if sameness.up_to_single:
-        cause = "the difference of each joint is at most the rounding error of the numbers in its description"
+        cause = "each joint differs at most by the rounding errors of the joint's numbers"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if sameness.within_single and sameness.single is not None:
         single = (

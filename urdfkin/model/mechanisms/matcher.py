@@ -189,8 +189,8 @@ class MechanismMatcher:
     def _match_count_bound(self, base: tuple[int, int]) -> int:
         """Two branches with m and n joints have at most min(m, n) joint pairs.
 
-        The same bound holds for links.
-        The sum of min(m, n) is largest if A's and B's branches are sorted by size.
+        The same bound holds for links. The sum of these bounds is largest if the branches of A and B are
+        paired by decreasing size.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):

@@ -500,7 +500,8 @@ class MatchedJoints:
             "kind":  both joints move, and their kinds differ
             "kind":  one model reverses a planar or floating joint, and `conversion` is None
             "":      all other joints
-        conversion: Conversion of a planar or floating joint with different coordinates, else None.
+        conversion: Conversion of a planar or floating joint with different coordinates. None for all other
+            joints.
     """
 
     a: int
@@ -569,7 +570,8 @@ class Alignment:
         X: (4, 4) pose of B's root in A's root frame.
         steps: Joint pairs, outwards from the base.
         match_count: Number of joint pairs and link pairs that agree.
-        max_difference: Largest tilt * size_of + shift of all joint pairs and link pairs, m.
+        max_difference: Largest difference of a joint pair or link pair, m. A difference is
+            tilt * size_of + shift.
     """
 
     a: Mechanism
@@ -752,7 +754,7 @@ class MatchedValues:
     #: Value in the positive direction and zero of B's own joint: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: `rounding` (rad or m) is then max(0, D - E). Otherwise, `rounding` is 0.
+    #: For such functions, `rounding` (rad or m) is max(0, D - E). For all other functions, `rounding` is 0.
     #: D is the absolute difference between the constants of the two computed functions.
     #: E is the rounding error of one joint.
     rounding: float = 0.0

@@ -45,8 +45,8 @@ Derivatives of y and d with respect to the value of joint i:
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')
 
-The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i only rotate
-y_i and d_i; these joints do not translate y_i and d_i.
+The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i rotate y_i
+and d_i, but do not translate y_i and d_i.
 """
 
 from __future__ import annotations
@@ -559,9 +559,9 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield joint indices i and j <= i, and an upper bound on the length of the second derivative of D.
+    """Yield joint indices i and j <= i, and an upper bound on the length of a second derivative of D.
 
-    The derivative is by the values of joints i and j.
+    The second derivative is with respect to the values of joints i and j.
     """
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
