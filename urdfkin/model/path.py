@@ -6,7 +6,7 @@ Each C_k is a constant pose. Each E_k is one of the motions Rx, Ry, Rz, Tx, Ty a
 Chains, Denavit-Hartenberg tables, screws, and the models of `dh --compare` and `calibrate` have this form.
 The amounts x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of the
 path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
-direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is
+direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is:
 
     for a rotation:      dp/dx = e x (p - O),   w = e
     for a translation:   dp/dx = e,             w = 0

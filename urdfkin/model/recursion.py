@@ -63,7 +63,7 @@ class Recursion:
 
     Attributes:
         eq: The textbook's equations.
-        own_axes: Axes of velocities and accelerations: link axes if True, else world axes.
+        own_axes: Whether velocities and accelerations are in the link's axes, not in world axes.
     """
 
     eq: Any

@@ -1524,9 +1524,9 @@ class Robot(Displayable):
                 not revolute.
             like: A published table. The result copies the positive joint directions, the directions of the x
                 axes, and the offsets d along parallel axes from this table. The result also copies theta of
-                the first and last row, and a and alpha of a standard table's last row. All other numbers come
-                from the URDF. With `like`, `flip`, `first`, `last`, `sign` and `parallel_offset` must have
-                their default values.
+                the first and last row. From a standard table, the result also copies a and alpha of the last
+                row. All other numbers come from the URDF. If `like` is used, the arguments `flip`, `first`,
+                `last`, `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1704,8 +1704,8 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # A plain str with the default reference is its own key.
-        # This key contains no `Reference`, because the hash of an enumeration member is slow.
+        # If `frame` is a plain str and `reference` is the default, `frame` is the key.
+        # The key then contains no `Reference`, because the hash of an enumeration member is slow.
         # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
         # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str

@@ -132,7 +132,7 @@ class JointMatcher:
         return self._subtree_shape(self.a, bodies[0], e) == self._subtree_shape(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis at A's body coincides with one at B's body.
+        """Return whether each joint axis at A's body coincides with a joint axis at B's body.
 
         X (4, 4) moves B before the comparison.
         """
@@ -482,7 +482,8 @@ ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatA
 #: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
 MAX_ASSIGNMENTS = 5000
 
-#: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
+#: The keys are the coordinates of A.
+#: Each value contains the matching coordinate of B, and B's velocity divided by A's velocity.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 

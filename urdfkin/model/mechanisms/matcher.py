@@ -2,8 +2,8 @@
 
 `MechanismMatcher` starts at a body of A and a body of B, and visits both trees joint by joint. At each joint,
 the matcher chooses the sign (`sense`) and the zero offset. The best choice makes the largest number of later
-links and axes of B coincide with links and axes of A. `align` compares the results for several first bodies
-and joint orders.
+links and axes of B coincide with links and axes of A. `align` compares the results for several starting
+bodies and joint orders.
 
 If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset:
 
@@ -114,7 +114,7 @@ class MechanismMatcher:
 
     Without `choices`, the matcher searches for B's root pose, signs, zero offsets and conversions.
     `base` contains the indices of the links of A and B where the search starts.
-    If `base` is None, the matcher chooses these links.
+    If `base` is None, the matcher chooses the links.
     """
 
     def __init__(
@@ -522,7 +522,7 @@ class MechanismMatcher:
             )
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
-        # Either K displaces the axis and all later bodies of B, or K displaces only the axis.
+        # The matcher compares two cases: all later bodies of B also move by K, or only the axis moves.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.motion_a)
         with_bodies = self._best_zero(next_pair, K @ body_pair.motion_a, screw_b, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -815,7 +815,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """If all axes differ slightly, no axes agree within the normal tolerance."""
+    """Align again with larger tolerances, because axes may all differ by more than the normal tolerance."""
     if best.all_joints_agree and best.has_free_frames:
         return best
     a, b, (least, most), look_ahead = (

@@ -3,8 +3,8 @@
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
 link's pose H describe the zero configuration, in one common frame. The poses of the links between the joints
 are not factors of this product. If links that are fixed to each other are merged or split, the product stays
-the same. Any body may be the root. A path from this root may lead from the child link of a joint to the
-parent link. In this case, the joint's screw is reversed.
+the same. Any body may be the root. If a path from the root leads from the child link of a joint to the
+parent link, the joint's screw is reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
 different frames for the joint. The constant rigid motion M describes this difference. A and B may also define
@@ -549,7 +549,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def move_difference_to_tool(self) -> FramePair:
-        """Return a copy in which `tool` contains the difference of the two frames.
+        """Return a copy in which `tool` contains the difference between A's frame and B's frame.
 
         In the copy, `constant_motion` is the identity, and `tilt` and `shift` are 0.
         """
@@ -617,8 +617,8 @@ class Alignment:
     def inner_difference_range(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
-        A link pair is ignored if neither link has a child joint. The result is (0, 0) if no other pair
-        differs.
+        A link pair is ignored if neither link has a child joint. The result is (0, 0) if all other pairs
+        agree.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -669,7 +669,7 @@ class Alignment:
         for a, b in pairs:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # A matched pair of links on these bodies gives the transform from B's body to A's body.
+            # The transform from B's body to A's body follows from two matched links on these bodies.
             T_a_b = known.constant_motion @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
             zero_pose, end = self.a.zero_poses[a], IDENTITY
             tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
@@ -889,7 +889,7 @@ class _VariablesBuilder:
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """The range of a variable is the intersection of the limits of all joints that the variable moves.
 
-        If this intersection is empty or a single value, the range is given by A's limits.
+        If the intersection is empty or a single value, the limits in A are the range.
         The limits of mimic joints are ignored: mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}

@@ -426,9 +426,9 @@ def _variable_samples(pair: MatchedValues, variables: Variables, grid: Grid) -> 
     Returns:
         (n,) samples, or None in these cases:
 
-            A's and B's joints have different variables
-            the range needs more than `MAX_SAMPLE_INTERVALS` intervals
-            the range is infinite, and a slope is not 0, 1 or -1
+            - The joints have different variables.
+            - The variable's range needs more than `MAX_SAMPLE_INTERVALS` intervals.
+            - The variable's range is infinite, and a slope is not 0, 1 or -1.
     """
     if (name := pair.variable) is None:
         return None
@@ -534,7 +534,8 @@ def curvature_bounds(
     Pairs without effect on D are ignored.
 
     Returns:
-        n names of variables, and (n, n) bounds (m, divided by the units of both variables).
+        Names of the n variables, and (n, n) bounds. The unit of a bound is m, divided by the units of both
+        variables.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
@@ -653,8 +654,8 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints that affect the length of D, and the values of these joints.
 
-    The result begins at the first joint that differs, or at an earlier joint that has the same variable as a
-    later joint of the result.
+    The result begins at the first joint that differs. If an earlier joint shares a variable with a joint of
+    the result, the result begins at the earlier joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),
