@@ -40,8 +40,7 @@ MATCHED_BY_AXES = (
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Distances and angles up to a limit are not printed.
-#: The limit is `ROUNDING_FACTOR` times the bound on rounding errors.
+#: Distances and angles up to this factor times the bound on rounding errors are not printed.
 #: The factor covers the rounding errors of sums of several terms.
 ROUNDING_FACTOR = 1.001
 #: Heading of a list of mimicked joints.

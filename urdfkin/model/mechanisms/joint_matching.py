@@ -341,14 +341,14 @@ def later_axes(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    If no other axis determines the rotation about this axis, the rotation is 0. If no other axis determines
-    the shift along this axis, the shift is 0.
+    If no other axis determines the rotation about A's axis, the rotation is 0. If no other axis determines
+    the shift along A's axis, the shift is 0.
     """
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If no joint follows this axis, the first axes of other branches determine the pose of B's root.
-        # For example, each rotor of a drone has a branch of its own with a single joint.
+        # If no joint follows `axis_a`, the first axes of all branches determine the pose of B's root.
+        # For example, each rotor of a drone is the only joint of its branch.
         others = after or [_with_reference_lines(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]

@@ -220,11 +220,12 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 def out_of_plane_compensation(M: FloatArray) -> FloatArray:
     """Return a motion N for which M P N is planar for every planar pose P.
 
-    The rotation of M must map the plane's normal z to z or -z.
+    The rotation of M must map the plane's normal z to z or -z:
 
         z maps to z:       M = E T,      N = T^-1
         z maps to -z:      M = E T F,    N = F T^-1
-        E: motion in the plane;  T: translation along the normal;  F: half a turn about x
+
+    E is a motion in the plane, T is a translation along the normal, and F is half a turn about x.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -447,7 +448,8 @@ def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, 
     Opposite directions count as parallel.
 
     Returns:
-        Angle (rad) between s and t. Distance (m) of `s.point` from the line t; 0 without `with_distance`.
+        Angle (rad) between s and t, and distance (m) of `s.point` from the line t. If `with_distance` is
+        False, the distance is 0.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -701,8 +703,7 @@ class AlignmentChoices:
     """Prescribed values for an alignment.
 
     Attributes:
-        base: Names of the links of A and B where the search starts.
-            None if the search chooses these links.
+        base: Names of the links of A and B where the search starts. None: the search chooses the links.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
         conversions: Conversions of planar and floating joints, by A's joint name.
@@ -751,7 +752,7 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: Value in the positive direction and zero of B's own joint: b_unconverted = sense * b + offset.
+    #: The value `sense * b + offset`, which uses the positive direction and the zero of B's joint.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
     #: For such functions, `rounding` (rad or m) is max(0, D - E). For all other functions, `rounding` is 0.
@@ -874,10 +875,8 @@ class _VariablesBuilder:
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two functions differ by rounding only.
 
-        Allowed differences, with the rounding error e of one joint:
-
-            slopes:      e
-            constants:   depth * e, because zero offsets are computed from poses
+        Let e be the rounding error of one joint. The slopes may differ by e. The constants may differ by
+        `depth * e`, because zero offsets are computed from poses.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)

@@ -528,10 +528,8 @@ def curvature_bounds(
 ) -> tuple[list[str], FloatArray]:
     """Return upper bounds on the lengths of the second derivatives of D for each pair of variables.
 
-        D = p_B - p_A:   difference of the frame's positions in A and B
-
-    All bounds are inf if paired joints have different variables or slopes.
-    Pairs without effect on D are ignored.
+    D = p_B - p_A is the difference of the frame's positions in A and B. All bounds are inf if paired joints
+    have different variables or slopes. Pairs without effect on D are ignored.
 
     Returns:
         Names of the n variables, and (n, n) bounds. The unit of a bound is m, divided by the units of both
