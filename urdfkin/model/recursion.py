@@ -218,9 +218,11 @@ class Recursion:
     ) -> tuple[Vector, Vector]:
         """Return d(column i)/dq_j.
 
-        column_i:   linear and angular part of column i
-        column_j:   linear and angular part of column j
-        is_before:  True if joint j is joint i or precedes joint i on the path
+        Args:
+            column_i: Linear and angular part of column i.
+            column_j: Linear and angular part of column j.
+            reference: Reference frame of the columns.
+            is_before: Whether joint j is joint i or precedes joint i on the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

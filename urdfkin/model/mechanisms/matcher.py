@@ -5,14 +5,11 @@ the matcher chooses the sign (`sense`) and the zero offset. The best choice make
 links and axes of B coincide with links and axes of A. `align` compares the results for several starting
 bodies and joint orders.
 
-If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset:
-
-    mimic rule of A:             v = m w + c
-    corresponding rule of B:     v' = m' w' + c'
-    alignment:                   v' = s v + o,  w' = s' w + o'
-    the rules are equivalent:    m' s' = s m,  m' o' + c' = s c + o
-
-For a revolute joint, a multiple of a full turn may always be added to o.
+If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. A has
+the rule `v = m w + c`, and B has the corresponding rule `v' = m' w' + c'`. The matched joints have the values
+`v' = s v + o` and `w' = s' w + o'`, with the signs s and s' and the zero offsets o and o'. The rules are
+equivalent if `m' s' = s m` and `m' o' + c' = s c + o`. For a revolute joint, a multiple of a full turn may
+always be added to o.
 """
 
 from __future__ import annotations
@@ -142,7 +139,7 @@ class MechanismMatcher:
         if choices is None and max(*a.depths, *b.depths) <= MAX_EXACT_SEARCH_DEPTH:
             self.exact = SubtreeMatcher(a, b, joint_matcher, tolerance, self._poses_after)
 
-    # -- first bodies ------------------------------------------------------------------------------
+    # -- start of the search -----------------------------------------------------------------------
 
     def find_best(self) -> Alignment:
         best: Alignment | None = None
@@ -156,10 +153,7 @@ class MechanismMatcher:
         return best
 
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield a body of A, a body of B and a pose (4, 4) of B's root in A's root frame, for each search.
-
-        The search for matching joints starts at the two bodies.
-        """
+        """Yield the start of each search: two bodies, and the pose (4, 4) of B's root in A's root frame."""
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -335,8 +329,8 @@ class MechanismMatcher:
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Pair a link of A with a link of B as end-effector frames.
 
-        Each label occurs in one model only.
-        The result is None if no such links exist, or if other links of the bodies are matched.
+        The label of each link occurs in one model only. The result is None if a body has no such link. The
+        result is also None if other links of the bodies are matched.
         """
         links_a, links_b = self._unshared_links(body_pair)
         if matched or not links_a or not links_b:
@@ -450,8 +444,7 @@ class MechanismMatcher:
             )
         body_pairs = ((N, replace(next_pair, motion_b=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
-        # P_a and P_b are the joint's poses in A and B.
-        # P_b = M P_a N.
+        # The joint has the pose P_a in A and the pose P_b = M P_a N in B.
         # If A's path crosses the joint from child to parent, P_a is inverted.
         # If B's path crosses the joint from child to parent, P_b is inverted.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
@@ -716,7 +709,7 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
     """Return the smallest rotation of A's planar joint that makes its plane parallel to B's plane.
 
     Returns:
-        Smallest rotation (4, 4), its angle (rad), and the shift 0.
+        (4, 4) rotation, its angle (rad), and the shift 0.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
@@ -866,18 +859,16 @@ OFFSET_TOLERANCE_FACTOR = 1e4
 class _RulePair:
     """The mimic rules of two matched joints.
 
-        x, y:             coordinates of A and B
-        A's joint:        m x + c
-        B's joint:        n y + d = s (m x + c) + o
-        s, o:             sign (1 or -1), zero offset
-        alpha, beta:      y = alpha x + beta
+    A's joint has the value `m x + c`, where x is a coordinate of A. B's joint has the value `n y + d`, where
+    y is a coordinate of B. The values agree if `n y + d = s (m x + c) + o`, with the sign s (1 or -1) and the
+    zero offset o. Therefore, the rules require `y = alpha x + beta`.
 
     Attributes:
-        slope_a: s m
-        constant_a: s c
-        slope_b: n
-        constant_b: d
-        offset: o
+        slope_a: The slope s m.
+        constant_a: The constant s c.
+        slope_b: The slope n.
+        constant_b: The constant d.
+        offset: The zero offset o.
         is_free: Whether o can have any value, because no later link or axis determines o.
         has_effect: Whether the joint moves matched links or later axes.
     """
@@ -966,10 +957,7 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _find_effects(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later links or axes determine the zero offset of joint pair i.
-
-    The second result is the value of `_RulePair.has_effect`.
-    """
+    """Return whether later links or axes determine the zero offset of pair i, and `_RulePair.has_effect`."""
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

@@ -9,9 +9,9 @@ parent link, the joint's screw is reversed.
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
 different frames for the joint. The constant rigid motion M describes this difference. A and B may also define
 different frames for the body after the joint. The constant rigid motion N describes this second difference. A
-and B move in the same way if
+and B move in the same way if:
 
-    P_b = M P_a N.
+`P_b = M P_a N`
 
 If the joint is reversed in one model, P_a^-1 replaces P_a.
 
@@ -26,9 +26,10 @@ the value t moves the bodies after it by exp(S t). The matched joint of B moves 
 exp(S' t'). S' and t' use the positive direction and the zero of A's joint. If G moves A's joint axis to B's
 joint axis, the bodies before and after the joint have the same G. If the axis and all later bodies of B are
 displaced together, G changes at the joint by a constant rigid motion L. If only the axis is displaced, S'
-differs from S. The link poses of A and B are then
+differs from S. The link poses of A and B are:
 
-    T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
+`T_A = exp(S_1 t_1) ... exp(S_n t_n) H`
+`T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H`
 
 Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i, then
 S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all joints and links, the two models have
@@ -220,10 +221,12 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 def out_of_plane_compensation(M: FloatArray) -> FloatArray:
     """Return a motion N for which M P N is planar for every planar pose P.
 
-    The rotation of M must map the plane's normal z to z or -z:
+    The rotation of M must map the plane's normal z to z or -z.
 
-        z maps to z:       M = E T,      N = T^-1
-        z maps to -z:      M = E T F,    N = F T^-1
+    | M maps z to | M | N |
+    |---|---|---|
+    | z | `E T` | `T^-1` |
+    | -z | `E T F` | `F T^-1` |
 
     E is a motion in the plane, T is a translation along the normal, and F is half a turn about x.
     """

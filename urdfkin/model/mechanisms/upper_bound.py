@@ -1,12 +1,14 @@
 """Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
-**Support functions.** Let W be a set of points.
+**Support functions.** The support function h(u) of a set W of points is the maximum of u . p over all points
+p in W. The largest distance of W from the origin is the maximum of h(u) over all unit vectors u. A motion of
+W changes h to h':
 
-    support function of W:            h(u) = max over p in W of u . p
-    largest distance from the origin: max of h(u) over all unit vectors u
-    after a rotation R of W:          h'(u) = h(R^T u)
-    after a range of rotations:       h'(u) = max of h(R^T u) over all angles of the range
-    after a range of translations p:  h'(u) = h(u) + max of u . p over all p of the range
+| motion of W | h'(u) |
+|---|---|
+| a rotation R | `h(R^T u)` |
+| all rotations R of a range | the maximum of `h(R^T u)` |
+| all translations p of a range | `h(u)` plus the maximum of `u . p` |
 
 urdfkin computes h joint by joint along the chain, without a search over joint values.
 
@@ -16,34 +18,27 @@ of a joint, the vectors R^T u form an arc. urdfkin encloses the arc in a polygon
 at a corner of a polygon. At each joint, the interpolated h can be larger than the true h. The relative
 difference is proportional to the square of the distance between grid points.
 
-**Recursion.** At joint i:
+**Recursion.** Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
+corresponding position of A's frame. Joint i moves A's frame by e(S t), and B's frame by L e(S' t') with the
+constant rigid motion L. If joint i moves too, d becomes:
 
-    y:                  position of B's frame if only the joints after joint i move
-    d:                  y minus the position of A's frame
-    e(S t), e(S' t'):   motions of joint i in A and in B
-    L:                  constant rigid motion before B's joint
+`d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d`
 
-    d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d
+If joint i is the same in A and B, the first three terms are 0. For each direction u, the maximum of u . d' is
+at most the sum of the maxima of the four terms. urdfkin computes the maxima from the support functions of y
+and d. If A and B differ at several joints, the terms of these joints may be largest in different
+configurations, so the sum can exceed the true maximum. A second bound is the sum of upper bounds on the
+displacements by the motions L. This sum is valid if all matched joints have equal axes and equal values. The
+result is the smaller bound.
 
-    joint i is the same in A and B:   the first three terms are 0
-    for each direction u:             max of u . d' <= sum of the maxima of the four terms
+**Second derivatives.** `curvature_bounds` computes bounds on the second derivatives of D = p_B - p_A, the
+difference of the frame's positions in A and B. The computation goes joint by joint from the frame to the
+base. Joint i has the screw S with the axis u, the point o and the value t in A, and S', u', o' and t' in B.
+The derivative of a rotated vector r with respect to the angle is u x r. With Y = e(S' t') y, the derivatives
+of y and d with respect to the value of joint i are:
 
-urdfkin computes the maxima from the support functions of y and d. If A and B differ at several joints, the
-terms of these joints may be largest in different configurations. The sum of the maxima then exceeds the true
-maximum. A second bound is the sum of upper bounds on the displacements by the motions L. This sum is valid
-if all matched joints have equal axes and equal values. The result is the smaller bound.
-
-**Second derivatives.** `curvature_bounds` computes bounds joint by joint, from the frame to the base.
-
-    D = p_B - p_A:      difference of the frame's positions in A and B
-    S, u, o, t:         screw, axis, point and value of joint i in A
-    S', u', o', t':     screw, axis, point and value of joint i in B
-    rotated vector r:   the derivative with respect to the angle is u x r
-    Y:                  e(S' t') y
-
-Derivatives of y and d with respect to the value of joint i:
-
-    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')
+`y_i = u' x (Y - o')`
+`d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')`
 
 The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i rotate y_i
 and d_i, but do not translate y_i and d_i.
@@ -166,7 +161,7 @@ class Support:
 
         The axis of the rotation contains the origin. The value at a grid point is:
 
-            h(along + factor R^T across)
+        `h(along + factor R^T across)`
 
         The vectors `along` and `across` are the grid point's parts parallel and perpendicular to the axis.
 
@@ -204,14 +199,12 @@ class Support:
     def max_distance(self) -> float:
         """Return an upper bound (m) on the distance of the points from the origin.
 
-        For a grid cell with the corners g_k:
+        Let r be the largest angle between the centre of a grid cell and the cell's corners g_k. A direction u
+        in the cell is the sum of c_k g_k with c_k >= 0. Therefore:
 
-            r:   the angle between g_k and the cell's centre is at most r
-            u:   sum of c_k g_k, c_k >= 0  (a direction in the cell)
-
-            h(u) <= sum of c_k h(g_k)
-            |u| >= cos r  sum of c_k |g_k|
-            h(u) / |u| <= max of h(g_k) / |g_k|  / cos r
+        `h(u) <= sum of c_k h(g_k)`
+        `|u| >= cos r * (sum of c_k |g_k|)`
+        `h(u) / |u| <= (max of h(g_k) / |g_k|) / cos r`
         """
         largest = float((self.values / self.grid.point_norms).max(initial=0.0))
         if math.isnan(largest):  # zero times infinity proves nothing
@@ -334,9 +327,9 @@ def _distance_bound(
 def _displacement_bound(L: FloatArray, reach: float) -> float:
     """Return an upper bound (m) on the displacement of a point y by L.
 
-    For L = (R, p) and |y| <= `reach`:
+    L consists of the rotation R and the translation p, and |y| is at most `reach`. The bound is:
 
-        |(R - 1) y + p| <= |R - 1| reach + |p|
+    `|R - 1| reach + |p|`
     """
     rotation, translation = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return translation + _product(rotation, reach)
@@ -447,25 +440,21 @@ def _common_variable_difference(
 ) -> Support:
     """Return the support function of d after two matched revolute joints with a common variable.
 
-    Definitions and bounds:
+    Let h be the distance of neighbouring samples of the variable. Between two samples, the bound is the
+    larger bound at the samples plus h^2/8 times a bound on the length of the second derivative.
+    If t' = t + c, the second derivative is:
 
-        samples:        samples of the variable
-        h:              distance of neighbouring samples
-        between them:   larger bound at the two samples + h^2/8 max |second derivative|
+    `d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'`
 
-        x, x':          vectors from the axes of A and B to y
-        P, P':          projections perpendicular to the axes
-        R, R':          rotations about the axes
-        u, u':          directions of the axes
+    In A, x is the vector from the axis u to y, P projects perpendicular to u, and R rotates about u. In B,
+    the symbols have a prime. The component of x' - x perpendicular to the axis is the offset of the axes,
+    and:
 
-        t' = t + c:     d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'
-                        |R' - R| <= 2 |u' - u| + |c|
-                        |P' - P| <= |u' - u|
-                        perpendicular part of x' - x = offset of the axes
+    `|R' - R| <= 2 |u' - u| + |c|`
+    `|P' - P| <= |u' - u|`
 
-        m, m':          slopes of t and t', if they differ
-        r, r':          largest distances of y from the axes
-                        |second derivative| <= m^2 r + m'^2 r'
+    If t and t' have different slopes m and m', the second derivative is at most m^2 r + m'^2 r'. Here r and
+    r' are the largest distances of y from the axes.
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b
@@ -499,13 +488,9 @@ def _independent_difference(
 ) -> Support:
     """Return the support function of e(S' t') y - e(S t) y for independent angles t and t'.
 
-    Definitions and bounds:
-
-        equal axes:       |e(S' t') y - e(S t) y| <= 2 r sin(a/2)
-                          r:  largest distance of y from the axis
-                          a:  largest |t' - t|, at most pi
-
-        different axes:   h = (h of e(S' t') y) + (h of -e(S t) y)
+    If the axes are different, the result is the sum of the support functions of e(S' t') y and -e(S t) y. If
+    the axes are equal, the length of the vector is at most 2 r sin(a/2). Here r is the largest distance of y
+    from the axis, and a is the smaller of pi and the largest |t' - t|.
     """
     G, u = y.grid.points, step.axis_a.direction
     if step.axis_b is not step.axis_a:
@@ -593,7 +578,7 @@ def _length_bound_at_base(
 ) -> float:
     """Return an upper bound on the length of d at the base.
 
-    `supports` contains the support functions of d and y before the motion L of `steps[-1]` is applied.
+    `supports` contains the support functions of d and y without the motion L of `steps[-1]`.
     """
     supports = supports_after_constant_motion(steps[-1], *supports)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
@@ -609,10 +594,7 @@ def _length_bound_at_base(
 def _derivative_supports(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _SupportPair:
-    """Return bounds on the derivatives of d and y with respect to a joint's value.
-
-    The motion L is not included.
-    """
+    """Return bounds on the derivatives of d and y with respect to a joint's value, without the motion L."""
     if step.kind != "turns":
         u, other = step.axis_a.direction, step.axis_b.direction
         return point_support(d.grid, other - u), point_support(d.grid, other)
@@ -621,12 +603,12 @@ def _derivative_supports(
 
 
 def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _SupportPair:
-    """Return upper bounds on the support functions of two derivatives.
+    """Return upper bounds on the support functions of these derivatives.
 
-        d_i = u x d + (u' - u) x (y - o') + u x (o - o')
-        y_i = u' x (y - o')
+    `d_i = u x d + (u' - u) x (y - o') + u x (o - o')`
+    `y_i = u' x (y - o')`
 
-    The arguments d and y are given after the joint's motion; x is the cross product.
+    The arguments d and y contain the joint's motion, and x is the cross product.
     """
     G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
