@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 SixVector = tuple[Number, ...]
-#: q[k:], v[k:] or a[k:], where k is the index of the joint's first number.
+#: The part of q, v or a that begins at the joint's first number.
 JointSlice = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)

@@ -255,7 +255,7 @@ class KinematicTree:
     Attributes:
         links: The link `links[i + 1]` is the child of `joints[i]`.
         joints: All joints in Pinocchio's order, with `joints[i].parent` <= i.
-        poses: Named poses, each for some joints.
+        poses: Named poses. A pose may contain only some of the joints.
     """
 
     name: str

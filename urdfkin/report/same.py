@@ -172,7 +172,7 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between matching frames, if model B is compared without changes.
+    """Describe the largest distance between matching frames of model A and the unchanged model B.
 
     The text is empty if rounding errors explain the distance. The text is also empty if `sameness.after` is
     empty, which means that no change brings model B closer to model A.

@@ -539,8 +539,8 @@ class Robot(Displayable):
     def integrate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
         """Return the configuration (..., nq) one second after `q` at constant joint velocities `v`.
 
-        The definition is that of Pinocchio's `integrate`. For another duration, pass `v * seconds`. The norm
-        of quaternions stays 1. Angles of continuous joints are not wrapped.
+        The definition is the same as in Pinocchio's `integrate`. For another duration, pass `v * seconds`.
+        The norm of quaternions stays 1. Angles of continuous joints are not wrapped.
 
         Args:
             q: (..., nq) rad, m.

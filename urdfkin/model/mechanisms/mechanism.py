@@ -65,7 +65,7 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A vector counts as parallel to an axis if the length of its perpendicular component is smaller than this.
+#: A vector counts as parallel to an axis if its perpendicular component is shorter than this value.
 #: The vector is a unit vector, or a distance vector in m.
 PARALLEL_TOLERANCE = 1e-12
 
