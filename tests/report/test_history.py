@@ -102,6 +102,18 @@ def test_a_terminal_shows_the_latest_runs_and_changes_or_all(
     assert "more: --all" not in everything
 
 
+def test_a_page_states_that_it_leaves_out_old_runs_and_changes(
+    month: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = read_history([month])
+    assert "shows the latest" not in as_html(found)
+    monkeypatch.setattr(module, "_MAX_LISTED", 3)
+    page = as_html(found)
+    assert "8 runs, 10 changes" in page
+    assert "The table shows the latest 3 runs." in page
+    assert "The list shows the latest 3 changes." in page
+
+
 def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> None:
     before, after = run_on(1, arms()), run_on(2, arms())
     after["robots"][0]["source"] = "robots/panda.urdf"

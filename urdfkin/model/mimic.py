@@ -1,7 +1,7 @@
 """The map from a path's coordinates q to the values G q + g of its joints, including mimic joints.
 
-The coordinates of a path are the independent joints that determine its joint values. The order of these
-coordinates is that of their first use on the path. A mimic joint has no coordinate; the value of a mimic
+The coordinates of a path are the independent joints that determine its joint values. The order of the
+coordinates is the order of their first use on the path. A mimic joint has no coordinate; the value of a mimic
 joint is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if the path
 does not contain the mimicked joint.
 """
@@ -52,7 +52,7 @@ class Coupling:
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The vector g of the joint values G q + g."""
+        """The constant terms g of the joint values G q + g."""
         return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, symbol: str = "q") -> CoordinateLayout:

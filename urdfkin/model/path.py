@@ -1,14 +1,17 @@
 """Poses and Jacobian of a path: a product of constant poses and elementary motions, such as Rz(x) or Tx(x).
 
-    T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
+`T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...`
 
-Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
-form. The amounts x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of
-the path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
-direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is
+Each C_k is a constant pose. Each E_k is one of the motions Rx, Ry, Rz, Tx, Ty and Tz by the amount x_k.
+Chains, Denavit-Hartenberg tables, screws, and the models of `dh --compare` and `calibrate` have this form.
+The amounts x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of the
+path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
+direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is:
 
-    for a rotation:      dp/dx = e x (p - O),   w = e
-    for a translation:   dp/dx = e,             w = 0
+| motion | dp/dx_k | w |
+|---|---|---|
+| rotation | `e x (p - O)` | `e` |
+| translation | `e` | 0 |
 
 This twist is a column of the Jacobian in equation 7.85.
 """

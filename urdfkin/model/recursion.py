@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 SixVector = tuple[Number, ...]
-#: q[k:], v[k:] or a[k:], where k is the index of the joint's first number.
+#: The part of q, v or a that begins at the joint's first number.
 JointSlice = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -63,7 +63,7 @@ class Recursion:
 
     Attributes:
         eq: The textbook's equations.
-        own_axes: Axes of velocities and accelerations: link axes if True, else world axes.
+        own_axes: Whether velocities and accelerations are in the link's axes, not in world axes.
     """
 
     eq: Any
@@ -110,7 +110,7 @@ class Recursion:
         return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
-        """`rates`: linear and angular joint velocity, then joint acceleration, in the child link's axes."""
+        """`rates` has the linear and angular velocity and acceleration of the joint, in the child's axes."""
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
         return replace(
@@ -196,8 +196,8 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
         """Yield the derivatives of the columns.
 
-        The tuples are (i, j, factor, x), where i and j are indices of v.
-        For each i and j, the sum of factor * x is d(column i)/dq_j.
+        The tuples are (i, j, factor, x), where i and j are indices of v. The derivative of column i with
+        respect to q_j is the sum of factor * x over all tuples with these indices.
         """
         point = ZERO if reference.at_world else s.p
         computed = [(one, self._column(one, point)) for one in columns]
@@ -218,9 +218,11 @@ class Recursion:
     ) -> tuple[Vector, Vector]:
         """Return d(column i)/dq_j.
 
-        column_i:   linear and angular part of column i
-        column_j:   linear and angular part of column j
-        is_before:  True if joint j is joint i or precedes joint i on the path
+        Args:
+            column_i: Linear and angular part of column i.
+            column_j: Linear and angular part of column j.
+            reference: Reference frame of the columns.
+            is_before: Whether joint j is joint i or precedes joint i on the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

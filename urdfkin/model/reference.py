@@ -23,8 +23,8 @@ class Reference(IntEnum):
     True
     """
 
-    own_axes: bool  #: Axes of the results: the frame's if True, else the world's.
-    at_world: bool  #: Point of the results: the world's origin if True, else the frame's.
+    own_axes: bool  #: Whether the results are in the frame's axes, not in the world's axes.
+    at_world: bool  #: Whether the results are for the body point at the world's origin.
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
         member = int.__new__(cls, number)

@@ -33,7 +33,7 @@ def summarize_robot(
             f"root {tree.links[0]}, default base {default_base}, default tip {default_tip}",
             Table(("link", "joint", *columns), rows, left=LEFT_ALIGNED_COLUMNS),
             *map(str, range_reductions(tree)),
-            f"frames: {len(tree.frame_names)}, every link and joint by its name; tips: {tips}",
+            f"frames: {len(tree.frame_names)} (names of links and joints); tips: {tips}",
             order_sentence,
         ),
     )

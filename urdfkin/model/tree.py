@@ -156,12 +156,12 @@ class Joint:
     Attributes:
         parent: Index of the parent link.
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, m.
-            For a locked joint: pose of the child link's frame.
+            For a locked joint, the pose of the child link's frame in the parent link's frame.
         axis: (3,) unit axis in the joint frame. A planar, floating or fixed joint has (1, 0, 0).
             A locked joint keeps its axis.
         pinocchio_tilt: Angle between `axis` and Pinocchio's axis, rad.
             urdfkin's kinematics do not use this angle.
-        lock: None unless the user fixed the joint.
+        lock: The original joint and its value, if the user fixed the joint.
     """
 
     name: str
@@ -255,7 +255,7 @@ class KinematicTree:
     Attributes:
         links: The link `links[i + 1]` is the child of `joints[i]`.
         joints: All joints in Pinocchio's order, with `joints[i].parent` <= i.
-        poses: Named poses, each for some joints.
+        poses: Named poses. A pose may contain only some of the joints.
     """
 
     name: str

@@ -189,9 +189,9 @@ def _units_cell(value: Units | str) -> str:
 #: Random samples cause smaller growth.
 GROWTH_FACTOR = 2.0
 #: Growth is no regression if the new disagreement (in eps * scale) is below this number.
-#: A single rounding error can be this large.
+#: A single rounding error can be as large as this number.
 DISAGREEMENT_FLOOR = 2.0
-#: If the new ratio of disagreement to bound is below this number, its growth is not a regression.
+#: Growth of a ratio of disagreement to bound is no regression if the new ratio is below this number.
 _BOUND_RATIO_FLOOR = 0.1
 
 

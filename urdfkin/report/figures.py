@@ -81,7 +81,7 @@ def _draw_row(
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _draw_bound_range(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    # A mark at the right end replaces results beyond the plot.
+    # If the largest result is outside the plot, a text at the right edge shows its value.
     if largest is None or largest > right:
         text = "✗ not finite" if largest is None else f"✗ {format_units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}

@@ -39,11 +39,10 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 #: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
 #: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: Maximum number of changes between runs on the HTML page.
-#: The page lists the latest changes first.
-#: A terminal shows at most this number of runs, and at most this number of changes.
-#: On a terminal, the option --all removes the limit.
+#: Maximum number of runs, and of changes, on a terminal without the option --all.
+#: The HTML page lists at most this number of changes of all robots together.
 MAX_SHOWN = 20
+#: Maximum number of runs, and of changes, in the HTML page's section on one robot.
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot.
 #: The key "" is for a run whose report does not contain the robot.
@@ -385,7 +384,7 @@ def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
 
 
 def list_changes(history: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes between runs, each in a pair with the index of the later run.
+    """Return all changes between runs. Each change has the index of the later run.
 
     The changes of the latest run come first. Within a run, regressions come before other changes.
     """
@@ -438,7 +437,6 @@ def as_html(history: History, command: str | None = None) -> str:
         unusable=history.unusable,
         repeated=history.repeated,
         marks=VERDICT_MARKS,
-        listed=_MAX_LISTED,
         units=format_units,
         share=_ratio_cell,
         command=command,
@@ -473,6 +471,7 @@ def _robot(history: History, robot: str, points: Sequence[Point], grouped: Chang
     verdicts, own_changes = _latest_verdicts(history, points), _robot_changes(grouped, points)
     return {
         "name": robot,
+        "runs": len(points),
         "points": points[: -_MAX_LISTED - 1 : -1],
         "last": points[-1],
         "verdicts": verdicts,

@@ -1,8 +1,9 @@
-"""Reports as HTML pages, and the 3D view in a notebook: they use no network and escape every name.
+"""Reports as HTML pages, and the 3D view in a notebook.
 
-A large report is split: the page has the summary, and each robot has a file with its details. The page loads
-a robot's file when the reader opens the robot's section. The files are scripts, because a page that is opened
-from disk cannot load other types of files.
+The pages and the view use no network and escape every name. A large report is split: the page has the
+summary, and each robot has a file with its details. The page loads a robot's file when the reader opens the
+robot's section. The files are scripts, because a page that is opened from disk cannot load other types of
+files.
 """
 
 from __future__ import annotations

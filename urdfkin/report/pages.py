@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _DISPLAY_UNITS = DisplayUnits(digits=6)
 
-#: The heat map shows ratios of disagreement to bound. The colour changes at each of these ratios.
+#: Ratios of disagreement to bound at which the colour of the heat map changes.
 HEAT_EDGES = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -204,9 +204,9 @@ def _heat_cell(checks: Sequence[ReportedCheck], subject_indices: dict[str, list[
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
     """Return an upper limit of the ratio "disagreement / bound" for one subject: a frame, joint or column.
 
-    The document has bounds only for the whole check, not for each subject. Therefore, this function divides
-    the subject's largest disagreement by the smallest bound of the check. The check's
-    `bound_ratio` is the largest ratio of all subjects, so a larger quotient is replaced by `bound_ratio`.
+    The document has bounds only for the whole check, not for each subject. The result is the subject's
+    largest disagreement divided by the check's smallest bound, but at most the check's `bound_ratio`. This
+    entry is the largest ratio of all subjects.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 has the ratio 0, even if the bound is 0.

@@ -1,9 +1,9 @@
 """Read report documents, and check the layout and the consistency of all entries.
 
-A user relies on a report, but somebody may have edited or truncated the file. Other entries of the
-report determine the outcome, the verdicts, the sums and the percentiles, and limit each ratio. This module
-reports entries that contradict other entries. The links and joints of a robot must form a tree. Independent
-joints must have consecutive indices in q and v, in the order of the joints.
+A user relies on a report, but somebody may have edited or truncated the file. This module computes the
+outcome, the verdicts, the sums and the percentiles from the other entries. Each ratio must lie between bounds
+that follow from other entries. The module reports every contradiction. The links and joints of a robot must
+form a tree. Independent joints must have consecutive indices in q and v, in the order of the joints.
 """
 
 from __future__ import annotations
@@ -275,14 +275,14 @@ def _check(
 def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
 
-    `bound_ratio` must lie between two quotients: `worst` / largest bound, and `worst` / smallest bound.
+    `bound_ratio` is at least `worst` / largest bound, and at most `worst` / smallest bound.
     """
     ratio, largest = _none_as_infinity(check["bound_ratio"]), _none_as_infinity(check["worst"])
     low, high = _none_as_infinity(check["bound"][0]), _none_as_infinity(check["bound"][1])
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
-        # Without results, the first bound is larger than the second.
+        # In a check without results, `bound[0]` is larger than `bound[1]`.
         if ratio or largest or check["worst_case"]:
             yield (
                 f"`bound` is {check['bound']}, as in a check without results, but `worst`, `bound_ratio` or"

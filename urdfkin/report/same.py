@@ -34,15 +34,13 @@ from urdfkin.robot import Robot
 #: Maximum number of printed lines for each kind of difference.
 #: The option --all removes the limit.
 MAX_LINES = 12
-#: Message for models that are not the same, if joint names or orders differ.
 MATCHED_BY_AXES = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Distances and angles up to a limit are not printed.
-#: The limit is `ROUNDING_FACTOR` times the bound on rounding errors.
+#: Distances and angles up to this factor times the bound on rounding errors are not printed.
 #: The factor covers the rounding errors of sums of several terms.
 ROUNDING_FACTOR = 1.001
 #: Heading of a list of mimicked joints.
@@ -62,7 +60,7 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
         bound = _length_and_angle(*sameness.bound_as_written)
         off = f"in every configuration no frame is off by more than {bound}"
     if sameness.up_to_single:
-        cause = "the difference of each joint is at most the rounding error of the numbers in its description"
+        cause = "each joint differs at most by the rounding errors of the joint's numbers"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if sameness.within_single and sameness.single is not None:
         single = (
@@ -113,7 +111,7 @@ def _length_and_angle(metres: float, radians: float) -> str:
 def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
     """Describe the largest distance and the largest angle between matching frames.
 
-    The text contains no distance and no angle that rounding errors can explain.
+    The text omits a distance or an angle that rounding errors can explain.
     """
 
     def largest_value(attribute: str) -> float:
@@ -138,7 +136,7 @@ def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float
 def _describe_distance(frame: Interval, rounding: tuple[float, float]) -> str:
     """Describe the distance and the angle between two matching frames.
 
-    The text contains no distance and no angle that rounding errors can explain.
+    The text omits a distance or an angle that rounding errors can explain.
     """
     parts = (
         [interval_text(length, frame.lower, frame.upper)]
@@ -160,7 +158,8 @@ def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
     The table shows the distances after the changes of model B in `sameness.after`. The verdict "same up to
-    single precision" is about the unchanged models. After this verdict, the heading lists the changes.
+    single precision" is about the unchanged models. If a report has this verdict, the heading lists the
+    changes.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
@@ -173,7 +172,7 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between matching frames, if model B is compared without changes.
+    """Describe the largest distance between matching frames of model A and the unchanged model B.
 
     The text is empty if rounding errors explain the distance. The text is also empty if `sameness.after` is
     empty, which means that no change brings model B closer to model A.
@@ -186,8 +185,8 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text contains the nonzero coordinates of model A. A joint of model B may have no matching independent
-    joint in model A. The text also contains the nonzero coordinate of this joint of B.
+    The text contains the nonzero coordinates of model A. The text also contains the nonzero coordinates of
+    those joints of model B that match no independent joint of model A.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -433,12 +432,11 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    Without `worst`, A is in its zero configuration, and B is in the matching configuration
-    `sameness.to_b(q_a)`. If `written` is True, model B has the base pose in the file of B. If `written` is
-    False, model B has the base pose `sameness.base`, which brings model B closest to model A. Each line
-    segment is four numbers: x and y of the start point, and x and y of the end point. Each picture has the
-    lines of A and the lines of B. In the enlarged picture, another line connects the origins of the worst
-    frame in A and in B.
+    If `worst` is None, A is in its zero configuration, and B is in the matching configuration. If `written`
+    is True, model B has the base pose in the file of B. If `written` is False, model B has the base pose
+    `sameness.base`, which brings model B closest to model A. Each line segment is four numbers: x and y of
+    the start point, and x and y of the end point. Each picture has the lines of A and the lines of B. In the
+    enlarged picture, another line connects the origins of the worst frame in A and in B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()

@@ -85,8 +85,8 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
     """Return the names of robots without checks, grouped by verdict and reason.
 
-    Groups of at most four robots are left out.
-    For example, all robots that an interrupted validation did not reach have the same reason.
+    For example, all robots that an interrupted validation did not reach have the same reason. Only groups of
+    five or more robots are returned.
     """
     names: dict[tuple[str, str | None], list[str]] = {}
     for robot in robots:

@@ -104,7 +104,7 @@ def checks_in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def quantities_by_heading(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the column headings of the table of robots, each with the quantities in this column."""
+    """Return the quantities of each column in the table of robots. The keys are the column headings."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].heading if name in QUANTITIES else name

@@ -98,8 +98,8 @@ class Robot(Displayable):
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`. For `v`
       and `a`, the only pose is `"neutral"`: all zeros.
 
-    A text that begins with the name of a pose needs only the values that differ from the pose. Every other
-    text, and every mapping, must contain a value for every coordinate.
+    A text that begins with the name of a pose needs only the values that differ from the pose. All other
+    texts and all mappings must contain every coordinate.
 
     Methods that compute a quantity share these arguments:
 
@@ -539,8 +539,8 @@ class Robot(Displayable):
     def integrate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
         """Return the configuration (..., nq) one second after `q` at constant joint velocities `v`.
 
-        The definition is that of Pinocchio's `integrate`. For another duration, pass `v * seconds`. The norm
-        of quaternions stays 1. Angles of continuous joints are not wrapped.
+        The definition is the same as in Pinocchio's `integrate`. For another duration, pass `v * seconds`.
+        The norm of quaternions stays 1. Angles of continuous joints are not wrapped.
 
         Args:
             q: (..., nq) rad, m.
@@ -713,9 +713,9 @@ class Robot(Displayable):
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
-            joints: The joints that remain movable; all other joints are locked. A locked joint without a
-                value in `lock` is at 0. If `lock` begins with the name of a pose, such as "ready", this joint
-                is at the pose's value instead.
+            joints: The joints that remain movable; all other joints are locked. If `lock` begins with the
+                name of a pose, such as "ready", the pose contains the missing values. Otherwise, the missing
+                values are 0.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -1197,8 +1197,8 @@ class Robot(Displayable):
         """Return the contributions of each joint to a frame's classical acceleration (eq. 7.125, 7.130).
 
         A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. A moving `base`
-        has one contribution. The sum of all contributions is the result of `acceleration`. The check compares
-        this sum with Pinocchio's acceleration.
+        has one contribution. The sum of all contributions is the result of `acceleration`, which the check
+        compares with Pinocchio's acceleration.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1412,8 +1412,9 @@ class Robot(Displayable):
 
         Args:
             frame: As in `export`.
-            quantities: As in `export`. A call of the module returns the quantity with the fewest inputs. If
-                several quantities have the fewest inputs, the call returns the first of these quantities.
+            quantities: As in `export`. A call of the module returns the quantity with the fewest of the
+                inputs q, v and a. If several quantities have equally few inputs, the call returns the first
+                of these quantities.
             reference: As in `export`.
             verify: As in `export`.
 
@@ -1506,9 +1507,9 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the last row ends at the tip if its four parameters suffice. "flange": the last row
                 ends on the last joint axis, and the tool transform leads from this axis to the tip.
-            parallel_offset: Rule for the offsets d along consecutive parallel axes. "last": the row of the
-                last of these axes contains the sum of the offsets. "first": the row of the first of these
-                axes contains the sum of the offsets. "each": each row contains the offset of this row's link.
+            parallel_offset: Row for the sum of the offsets d along consecutive parallel axes. "last": the row
+                of the last axis. "first": the row of the first axis. "each": no sum, each row contains the
+                offset of its own link.
             flip: Names of joints whose positive direction is reversed in the table.
             first: "base": d_1 and theta_1 contain the offset along the first axis and the rotation about this
                 axis. "joint": d_1 and theta_1 are 0, and the table's base transform contains the offset and
@@ -1523,15 +1524,15 @@ class Robot(Displayable):
                 not revolute.
             like: A published table. The result copies the positive joint directions, the directions of the x
                 axes, and the offsets d along parallel axes from this table. The result also copies theta of
-                the first and last row, and a and alpha of a standard table's last row. All other numbers come
-                from the URDF. With `like`, `flip`, `first`, `last`, `sign` and `parallel_offset` must have
-                their default values.
+                the first and last row. From a standard table, the result also copies a and alpha of the last
+                row. All other numbers come from the URDF. If `like` is used, the arguments `flip`, `first`,
+                `last`, `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
             UnknownNameError: a frame or a joint does not exist.
-            InputError: an option has an invalid value, `like` excludes an option or describes a different
-                robot, or the path contains a planar or floating joint.
+            InputError: an option has an invalid value; `like` excludes an option; `like` describes a
+                different robot; the path contains a planar or floating joint.
             RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
             TableError: Pinocchio's placements differ by more than the bound.
 
@@ -1703,8 +1704,8 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # A plain str with the default reference is its own key.
-        # This key contains no `Reference`, because the hash of an enumeration member is slow.
+        # If `frame` is a plain str and `reference` is the default, `frame` is the key.
+        # The key then contains no `Reference`, because the hash of an enumeration member is slow.
         # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
         # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str

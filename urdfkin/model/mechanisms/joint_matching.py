@@ -6,8 +6,8 @@ equal labels. By default, a link's label is the link's name. Third, the remainin
 paired by geometry, the most similar joints first.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. With these zero offsets, links with equal labels must also coincide. The multipliers
-of the mimic rules must correspond; the method `SubtreeMatcher.ignore_mimic_rules` removes this condition.
+the other subtree. The zero offsets must also make links with equal labels coincide. The multipliers of the
+mimic rules must correspond; the method `SubtreeMatcher.ignore_mimic_rules` removes this condition.
 
 The value of the joint before a subtree does not matter, because the joint's zero offset can compensate any
 value. Therefore, the result of a comparison depends on two things only: the two joints before the subtrees,
@@ -136,7 +136,7 @@ class JointMatcher:
         return self._subtree_shape(self.a, bodies[0], e) == self._subtree_shape(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis at A's body coincides with one at B's body.
+        """Return whether each joint axis at A's body coincides with a joint axis at B's body.
 
         X (4, 4) moves B before the comparison.
         """
@@ -318,8 +318,8 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
             yield candidate
 
 
-#: Below this sine of the angle between two axes, an error of one axis moves the nearest points of the axes by
-#: more than 100 times the error.
+#: Two axes are nearly parallel if the sine of their angle is below this value. An error of one axis can move
+#: the nearest points of nearly parallel axes by more than 100 times the error.
 _NEARLY_PARALLEL_SINE = 1e-2
 
 
@@ -397,14 +397,14 @@ def refine_choices(alignment: Alignment) -> AlignmentChoices:
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    If no other axis determines the rotation about this axis, the rotation is 0. If no other axis determines
-    the shift along this axis, the shift is 0.
+    If no other axis determines the rotation about A's axis, the rotation is 0. If no other axis determines
+    the shift along A's axis, the shift is 0.
     """
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If no joint follows this axis, the first axes of other branches determine the pose of B's root.
-        # For example, each rotor of a drone has a branch of its own with a single joint.
+        # If no joint follows `axis_a`, the first axes of all branches determine the pose of B's root.
+        # For example, each rotor of a drone is the only joint of its branch.
         others = after or [_with_reference_lines(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -486,9 +486,9 @@ def _first_revolute_axes(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """For each branch of A with each branch of B, return the first revolute axes of both branches.
 
-    A pair is an axis of A and an axis of B.
-    Each item is (revolute pair, prismatic pairs before this pair, pairs from `later_axes`).
-    If the branches have no revolute pair, the first entry is the last prismatic pair.
+    A pair is an axis of A and an axis of B. Each item contains a revolute pair, the prismatic pairs before
+    the revolute pair, and the pairs from `later_axes`. If the branches have no revolute pair, the last
+    prismatic pair replaces it.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -531,14 +531,15 @@ def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None)
 
 #: Function that proposes poses of the next body of B.
 #: The first argument contains the next bodies of A and B.
-#: The second argument is one joint of A and one joint of B: the joints before the next bodies.
+#: The second argument contains A's joint before its next body, and B's joint before its next body.
 #: The third argument is the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
 #: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
 MAX_ASSIGNMENTS = 5000
 
-#: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
+#: The keys are the coordinates of A.
+#: Each value contains the matching coordinate of B, and B's velocity divided by A's velocity.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 
@@ -680,9 +681,9 @@ class SubtreeMatcher:
         return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of A's joint e can move B from the pose X to `other`.
+        """Return whether B's poses X and `other` differ only by a motion of A's joint e.
 
-        For a planar joint, the result is true only if X equals `other`.
+        For a planar joint, the poses must be equal.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:

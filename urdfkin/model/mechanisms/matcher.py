@@ -2,17 +2,14 @@
 
 `MechanismMatcher` starts at a body of A and a body of B, and visits both trees joint by joint. At each joint,
 the matcher chooses the sign (`sense`) and the zero offset. The best choice makes the largest number of later
-links and axes of B coincide with links and axes of A. `align` compares the results for several first bodies
-and joint orders.
+links and axes of B coincide with links and axes of A. `align` compares the results for several starting
+bodies and joint orders.
 
-If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset:
-
-    mimic rule of A:             v = m w + c
-    corresponding rule of B:     v' = m' w' + c'
-    alignment:                   v' = s v + o,  w' = s' w + o'
-    the rules are equivalent:    m' s' = s m,  m' o' + c' = s c + o
-
-For a revolute joint, a multiple of a full turn may always be added to o.
+If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. A has
+the rule `v = m w + c`, and B has the corresponding rule `v' = m' w' + c'`. The matched joints have the values
+`v' = s v + o` and `w' = s' w + o'`, with the signs s and s' and the zero offsets o and o'. The rules are
+equivalent if `m' s' = s m` and `m' o' + c' = s c + o`. For a revolute joint, a multiple of a full turn may
+always be added to o.
 """
 
 from __future__ import annotations
@@ -62,8 +59,8 @@ MAX_EXACT_SEARCH_DEPTH = 200
 #: If several choices at a joint are equally good, the joints after this joint decide.
 #: The matcher compares at most this number of joints on each branch.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root that the search for an exact match computes from axes and tries.
-#: The number applies to each pair of first bodies.
+#: The search for an exact match computes poses of B's root from axes.
+#: For each pair of bodies where the search starts, the search uses at most this number of poses.
 MAX_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
 #: For equal numbers, a score with a much smaller difference (m) is better.
@@ -78,10 +75,9 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """The number of comparisons that remain for decisions between equally good choices at a joint.
+    """A limit on the comparisons that decide between equally good choices at a joint.
 
-    To decide, a matcher compares joints of A with joints of B, farther along the two trees. Several matchers
-    can share this number.
+    A matcher compares later joints of A with later joints of B. Several matchers can share a limit.
 
     Attributes:
         remaining: Number of joint pairs that may still be compared.
@@ -95,13 +91,13 @@ class BodyPair:
     """A body of A and the corresponding body of B.
 
     Attributes:
-        via: The joints of A and of B before the bodies; None at the first bodies.
-        previous: Index in `Alignment.steps` of the joint pair before the bodies.
-            -1 at the first bodies, in `_score_ahead` and in `_poses_after`.
+        via: The joints of A and of B before the bodies. None for the bodies at which the search starts.
+        previous: Index in `Alignment.steps` of the joint pair before the bodies. -1 if `Alignment.steps` does
+            not contain such a pair.
         motion_a: (4, 4) motion G, the product of the motions L at earlier joints.
-        motion_b: (4, 4) motion of B's body due to the root pose, and due to earlier zero offsets and
-            conversions. The matcher compares motion_a @ (zero pose of A's link) with motion_b @ (zero pose of
-            B's link).
+        motion_b: (4, 4) motion of B's body. The root pose, earlier zero offsets and earlier conversions
+            determine this motion. The matcher compares motion_a @ (zero pose of A's link) with
+            motion_b @ (zero pose of B's link).
     """
 
     bodies: tuple[int, int]
@@ -116,7 +112,7 @@ class MechanismMatcher:
 
     Without `choices`, the matcher searches for B's root pose, signs, zero offsets and conversions.
     `base` contains the indices of the links of A and B where the search starts.
-    If `base` is None, the matcher chooses these links.
+    If `base` is None, the matcher chooses the links.
     """
 
     def __init__(
@@ -144,7 +140,7 @@ class MechanismMatcher:
         if choices is None and max(*a.depths, *b.depths) <= MAX_EXACT_SEARCH_DEPTH:
             self.exact = SubtreeMatcher(a, b, joint_matcher, tolerance, self._poses_after)
 
-    # -- first bodies ------------------------------------------------------------------------------
+    # -- start of the search -----------------------------------------------------------------------
 
     def find_best(self) -> Alignment:
         best: Alignment | None = None
@@ -158,10 +154,7 @@ class MechanismMatcher:
         return best
 
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield a body of A, a body of B and a pose (4, 4) of B's root in A's root frame, for each search.
-
-        The search for matching joints starts at the two bodies.
-        """
+        """Yield the start of each search: two bodies, and the pose (4, 4) of B's root in A's root frame."""
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -191,8 +184,8 @@ class MechanismMatcher:
     def _match_count_bound(self, base: tuple[int, int]) -> int:
         """Two branches with m and n joints have at most min(m, n) joint pairs.
 
-        The same bound holds for links.
-        The sum of min(m, n) is largest if A's and B's branches are sorted by size.
+        The same bound holds for links. The sum of these bounds is largest if the branches of A and B are
+        paired by decreasing size.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -337,8 +330,8 @@ class MechanismMatcher:
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Pair a link of A with a link of B as end-effector frames.
 
-        Each label occurs in one model only.
-        The result is None if no such links exist, or if other links of the bodies are matched.
+        The label of each link occurs in one model only. The result is None if a body has no such link. The
+        result is also None if other links of the bodies are matched.
         """
         links_a, links_b = self._unshared_links(body_pair)
         if matched or not links_a or not links_b:
@@ -452,8 +445,7 @@ class MechanismMatcher:
             )
         body_pairs = ((N, replace(next_pair, motion_b=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
-        # P_a and P_b are the joint's poses in A and B.
-        # P_b = M P_a N.
+        # The joint has the pose P_a in A and the pose P_b = M P_a N in B.
         # If A's path crosses the joint from child to parent, P_a is inverted.
         # If B's path crosses the joint from child to parent, P_b is inverted.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
@@ -474,8 +466,8 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N in P_b = M P_a N; see the module `mechanism`.
 
-        `compensation` is one possible N of a planar joint, and None for a floating joint.
-        `pose_a` includes `motion_a`.
+        `compensation` is one possible N of a planar joint. A floating joint has the value None. `pose_a`
+        includes `motion_a`.
         """
         yield IDENTITY if compensation is None else compensation
         candidates = [next_pair.motion_b]
@@ -524,7 +516,7 @@ class MechanismMatcher:
             )
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
-        # Either K displaces the axis and all later bodies of B, or K displaces only the axis.
+        # The matcher compares two cases: all later bodies of B also move by K, or only the axis moves.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.motion_a)
         with_bodies = self._best_zero(next_pair, K @ body_pair.motion_a, screw_b, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -579,7 +571,7 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_OffsetOrPose, BodyPair]], depth: int
     ) -> tuple[_OffsetOrPose, BodyPair, Score]:
-        """Return the choice for which most links and axes agree.
+        """Return the zero offset or the pose with the most agreeing links and axes.
 
         Later joints decide between equally good choices. For example, perpendicular axes that intersect
         allow two poses of B, so a third axis decides.
@@ -593,7 +585,7 @@ class MechanismMatcher:
                 continue
             score = self._score(body_pair)
             scored.append((choice, body_pair, score))
-            # If all axes and links agree, no other choice can agree better.
+            # All axes and links agree, so the remaining choices cannot be better.
             if not score[1] and self.joint_matcher.link_pairs(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
@@ -679,7 +671,7 @@ def _best_of(
 
 
 def _is_better_alignment(one: Alignment, than: Alignment) -> bool:
-    # The frames of a table are free, so its links decide only between alignments with equal joints.
+    # A convention chooses the link frames of a table, so the agreement of the joints comes first.
     if one.has_free_frames and one.all_joints_agree != than.all_joints_agree:
         return one.all_joints_agree
     return is_better(one.score, than.score)
@@ -718,7 +710,7 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
     """Return the smallest rotation of A's planar joint that makes its plane parallel to B's plane.
 
     Returns:
-        Smallest rotation (4, 4), its angle (rad), and the shift 0.
+        (4, 4) rotation, its angle (rad), and the shift 0.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
@@ -819,7 +811,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """If all axes differ slightly, no axes agree within the normal tolerance."""
+    """Align again with larger tolerances, because axes may all differ by more than the normal tolerance."""
     if best.all_joints_agree and best.has_free_frames:
         return best
     a, b, (least, most), look_ahead = (
@@ -881,8 +873,8 @@ def _best_alignment(
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Allowed difference between a computed zero offset and the zero offset of a mimic rule,
-#: as a multiple of the angle tolerance. A zero offset that is computed from the axes of the joint
-#: and of a later joint is inexact if the two axes are nearly the same line.
+#: as a multiple of the angle tolerance.
+#: A computed zero offset is inexact if the axes of the joint and of a later joint nearly coincide.
 OFFSET_TOLERANCE_FACTOR = 1e4
 
 
@@ -890,19 +882,17 @@ OFFSET_TOLERANCE_FACTOR = 1e4
 class _RulePair:
     """The mimic rules of two matched joints.
 
-        x, y:             coordinates of A and B
-        A's joint:        m x + c
-        B's joint:        n y + d = s (m x + c) + o
-        s, o:             sign (1 or -1), zero offset
-        alpha, beta:      y = alpha x + beta
+    A's joint has the value `m x + c`, where x is a coordinate of A. B's joint has the value `n y + d`, where
+    y is a coordinate of B. The values agree if `n y + d = s (m x + c) + o`, with the sign s (1 or -1) and the
+    zero offset o. Therefore, the rules require `y = alpha x + beta`.
 
     Attributes:
-        slope_a: s m
-        constant_a: s c
-        slope_b: n
-        constant_b: d
-        offset: o
-        is_free: True if no later link or axis determines o. Then o can have any value.
+        slope_a: The slope s m.
+        constant_a: The constant s c.
+        slope_b: The slope n.
+        constant_b: The constant d.
+        offset: The zero offset o.
+        is_free: Whether o can have any value, because no later link or axis determines o.
         has_effect: Whether the joint moves matched links or later axes.
     """
 
@@ -940,8 +930,8 @@ def zeros_by_mimic_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[
     zeros = dict[str, tuple[int, float]]()
     for rules in _group_rule_pairs(alignment):
         alphas = [rule.slope_a / rule.slope_b for rule in rules if rule.slope_b]
-        # Rules of a joint pair: y = alpha x + beta, with the coordinates x of A and y of B.
-        # Only the joint pairs with the most frequent alpha get a new zero offset.
+        # The rules of a joint pair require y = alpha x + beta for the coordinates x of A and y of B.
+        # Joint pairs can differ in alpha, so only the pairs with the most frequent alpha get a new offset.
         alpha = max(
             alphas, key=lambda one: sum(_are_close(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -990,10 +980,7 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _find_effects(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later links or axes determine the zero offset of joint pair i.
-
-    The second result is the value of `_RulePair.has_effect`.
-    """
+    """Return whether later links or axes determine the zero offset of pair i, and `_RulePair.has_effect`."""
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

@@ -3,15 +3,17 @@
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
 link's pose H describe the zero configuration, in one common frame. The poses of the links between the joints
 are not factors of this product. If links that are fixed to each other are merged or split, the product stays
-the same. Any body may be the root. A path from this root may lead from the child link of a joint to the
-parent link. In this case, the joint's screw is reversed.
+the same. Any body may be the root. If a path from the root leads from the child link of a joint to the
+parent link, the joint's screw is reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
 different frames for the joint. The constant rigid motion M describes this difference. A and B may also define
 different frames for the body after the joint. The constant rigid motion N describes this second difference. A
-and B move in the same way if
+and B move in the same way if:
 
-    P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
+`P_b = M P_a N`
+
+If the joint is reversed in one model, P_a^-1 replaces P_a.
 
 For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses, which are
 translations and rotations in the joint's plane. Therefore, M P N must be a planar pose for every planar pose
@@ -24,9 +26,10 @@ the value t moves the bodies after it by exp(S t). The matched joint of B moves 
 exp(S' t'). S' and t' use the positive direction and the zero of A's joint. If G moves A's joint axis to B's
 joint axis, the bodies before and after the joint have the same G. If the axis and all later bodies of B are
 displaced together, G changes at the joint by a constant rigid motion L. If only the axis is displaced, S'
-differs from S. The link poses of A and B are then
+differs from S. The link poses of A and B are:
 
-    T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
+`T_A = exp(S_1 t_1) ... exp(S_n t_n) H`
+`T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H`
 
 Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i, then
 S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all joints and links, the two models have
@@ -62,7 +65,7 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A vector counts as parallel to an axis if the length of its perpendicular component is smaller than this.
+#: A vector counts as parallel to an axis if its perpendicular component is shorter than this value.
 #: The vector is a unit vector, or a distance vector in m.
 PARALLEL_TOLERANCE = 1e-12
 
@@ -81,7 +84,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
     The motion contains no rotation about the axis, and no shift along the axis.
 
     Returns:
-        (4, 4) motion, its tilt (rad), and its shift (m), which is 0 for prismatic joints.
+        (4, 4) motion, tilt (rad) and shift (m). The shift is 0 for prismatic joints.
     """
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
@@ -163,10 +166,7 @@ class FreeJointConversion:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid motions, and the joint can reach M P N.
-
-        The method checks two poses P.
-        """
+        """Check that M and N are rigid motions, and that the joint can reach M P N for two poses P."""
         if not all(is_joint_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _TEST_COORDINATES)
@@ -223,9 +223,12 @@ def out_of_plane_compensation(M: FloatArray) -> FloatArray:
 
     The rotation of M must map the plane's normal z to z or -z.
 
-        z maps to z:       M = E T,      N = T^-1
-        z maps to -z:      M = E T F,    N = F T^-1
-        E: motion in the plane;  T: translation along the normal;  F: half a turn about x
+    | M maps z to | M | N |
+    |---|---|---|
+    | z | `E T` | `T^-1` |
+    | -z | `E T F` | `F T^-1` |
+
+    E is a motion in the plane, T is a translation along the normal, and F is half a turn about x.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -314,7 +317,7 @@ class Mechanism:
     def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy of the mechanism with the joints `names` in this order.
 
-        `allows_order` must be true. A link is omitted if its pose depends on the order.
+        `allows_order` must be true. The copy omits a link if different joints move it in the new order.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -330,7 +333,7 @@ class Mechanism:
         return other
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the joints give the same motion in the order `names`.
+        """Return whether the robot moves in the same way with its joints in the order `names`.
 
         The result is false if the joints are not consecutive.
         """
@@ -448,7 +451,8 @@ def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, 
     Opposite directions count as parallel.
 
     Returns:
-        Angle (rad) between s and t. Distance (m) of `s.point` from the line t; 0 without `with_distance`.
+        Angle (rad) between s and t, and distance (m) of `s.point` from the line t. If `with_distance` is
+        False, the distance is 0.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -501,7 +505,8 @@ class MatchedJoints:
             "kind":  both joints move, and their kinds differ
             "kind":  one model reverses a planar or floating joint, and `conversion` is None
             "":      all other joints
-        conversion: Conversion of a planar or floating joint with different coordinates, else None.
+        conversion: Conversion of a planar or floating joint with different coordinates. None for all other
+            joints.
     """
 
     a: int
@@ -549,7 +554,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def move_difference_to_tool(self) -> FramePair:
-        """Return a copy in which `tool` contains the difference of the two frames.
+        """Return a copy in which `tool` contains the difference between A's frame and B's frame.
 
         In the copy, `constant_motion` is the identity, and `tilt` and `shift` are 0.
         """
@@ -570,7 +575,8 @@ class Alignment:
         X: (4, 4) pose of B's root in A's root frame.
         steps: Joint pairs, outwards from the base.
         match_count: Number of joint pairs and link pairs that agree.
-        max_difference: Largest tilt * size_of + shift of all joint pairs and link pairs, m.
+        max_difference: Largest difference of a joint pair or link pair, m. A difference is
+            tilt * size_of + shift.
     """
 
     a: Mechanism
@@ -592,7 +598,7 @@ class Alignment:
 
     @property
     def has_free_frames(self) -> bool:
-        """Whether A or B is made of a Denavit-Hartenberg table, so that its frames follow a convention."""
+        """Whether a convention chooses the frames of A or B, as in a Denavit-Hartenberg table."""
         return self.a.free_frames or self.b.free_frames
 
     @property
@@ -616,8 +622,8 @@ class Alignment:
     def inner_difference_range(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
-        A link pair is ignored if neither link has a child joint. The result is (0, 0) if no other pair
-        differs.
+        A link pair is ignored if neither link has a child joint. The result is (0, 0) if all other pairs
+        agree.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -645,7 +651,7 @@ class Alignment:
         """Yield sets of two joint pairs that can exchange their partners.
 
         Both pairs have the same kind and the same previous pair.
-        Each pair of the set differs, or a joint pair or link pair after it on a path from the base differs.
+        Each pair is on the path from the base to a joint pair or link pair that differs.
         In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
@@ -668,7 +674,7 @@ class Alignment:
         for a, b in pairs:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # A matched pair of links on these bodies gives the transform from B's body to A's body.
+            # The transform from B's body to A's body follows from two matched links on these bodies.
             T_a_b = known.constant_motion @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
             zero_pose, end = self.a.zero_poses[a], IDENTITY
             tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
@@ -700,8 +706,7 @@ class AlignmentChoices:
     """Prescribed values for an alignment.
 
     Attributes:
-        base: Names of the links of A and B where the search starts.
-            None if the search chooses these links.
+        base: Names of the links of A and B where the search starts. None: the search chooses the links.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
         conversions: Conversions of planar and floating joints, by A's joint name.
@@ -750,10 +755,10 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: Value in the positive direction and zero of B's own joint: b_unconverted = sense * b + offset.
+    #: The value `sense * b + offset`, which uses the positive direction and the zero of B's joint.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: `rounding` (rad or m) is then max(0, D - E). Otherwise, `rounding` is 0.
+    #: For such functions, `rounding` (rad or m) is max(0, D - E). For all other functions, `rounding` is 0.
     #: D is the absolute difference between the constants of the two computed functions.
     #: E is the rounding error of one joint.
     rounding: float = 0.0
@@ -775,7 +780,8 @@ class Variables:
             joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
         rule_differences: Indices of the joint pairs with different mimic rules.
-        coordinates_b: Function of a variable for each coordinate of B. The keys are the names of B's joints.
+        coordinates_b: Functions that compute B's coordinates from the variables. The keys are the names of
+            B's joints.
     """
 
     pairs: tuple[MatchedValues | None, ...]
@@ -872,10 +878,8 @@ class _VariablesBuilder:
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two functions differ by rounding only.
 
-        Allowed differences, with the rounding error e of one joint:
-
-            slopes:      e
-            constants:   depth * e, because zero offsets are computed from poses
+        Let e be the rounding error of one joint. The slopes may differ by e. The constants may differ by
+        `depth * e`, because zero offsets are computed from poses.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)
@@ -887,7 +891,7 @@ class _VariablesBuilder:
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """The range of a variable is the intersection of the limits of all joints that the variable moves.
 
-        If this intersection is empty or a single value, the range is given by A's limits.
+        If the intersection is empty or a single value, the limits in A are the range.
         The limits of mimic joints are ignored: mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}

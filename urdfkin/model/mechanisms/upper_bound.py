@@ -1,52 +1,47 @@
 """Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
-**Support functions.** Let W be a set of points.
+**Support functions.** The support function h(u) of a set W of points is the maximum of u . p over all points
+p in W. The largest distance of W from the origin is the maximum of h(u) over all unit vectors u. A motion of
+W changes h to h':
 
-    support function of W:            h(u) = max over p in W of u . p
-    largest distance from the origin: max of h(u) over all unit vectors u
-    after a rotation R of W:          h'(u) = h(R^T u)
-    after a range of rotations:       h'(u) = max of h(R^T u) over all angles of the range
-    after a range of translations p:  h'(u) = h(u) + max of u . p over all p of the range
+| motion of W | h'(u) |
+|---|---|
+| a rotation R | `h(R^T u)` |
+| all rotations R of a range | the maximum of `h(R^T u)` |
+| all translations p of a range | `h(u)` plus the maximum of `u . p` |
 
 urdfkin computes h joint by joint along the chain, without a search over joint values.
 
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
 s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For all rotations R in the range
-of a joint, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon is at
-one of its corners. At each joint, the interpolated h can be larger than the true h. The relative difference
-is proportional to the square of the distance between grid points.
+of a joint, the vectors R^T u form an arc. urdfkin encloses the arc in a polygon. A convex function is largest
+at a corner of a polygon. At each joint, the interpolated h can be larger than the true h. The relative
+difference is proportional to the square of the distance between grid points.
 
-**Recursion.** At joint i:
+**Recursion.** Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
+corresponding position of A's frame. Joint i moves A's frame by e(S t), and B's frame by L e(S' t') with the
+constant rigid motion L. If joint i moves too, d becomes:
 
-    y:                  position of B's frame if only the joints after joint i move
-    d:                  y minus the position of A's frame
-    e(S t), e(S' t'):   motions of joint i in A and in B
-    L:                  constant rigid motion before B's joint
+`d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d`
 
-    d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d
+If joint i is the same in A and B, the first three terms are 0. For each direction u, the maximum of u . d' is
+at most the sum of the maxima of the four terms. urdfkin computes the maxima from the support functions of y
+and d. If A and B differ at several joints, the terms of these joints may be largest in different
+configurations, so the sum can exceed the true maximum. A second bound is the sum of upper bounds on the
+displacements by the motions L. This sum is valid if all matched joints have equal axes and equal values. The
+result is the smaller bound.
 
-    joint i is the same in A and B:   the first three terms are 0
-    for each direction u:             max of u . d' <= sum of the maxima of the four terms
+**Second derivatives.** `curvature_bounds` computes bounds on the second derivatives of D = p_B - p_A, the
+difference of the frame's positions in A and B. The computation goes joint by joint from the frame to the
+base. Joint i has the screw S with the axis u, the point o and the value t in A, and S', u', o' and t' in B.
+The derivative of a rotated vector r with respect to the angle is u x r. With Y = e(S' t') y, the derivatives
+of y and d with respect to the value of joint i are:
 
-urdfkin computes the maxima from the support functions of y and d. If A and B differ at several joints, the
-terms of these joints may be largest in different configurations. The sum of the maxima then exceeds the true
-maximum. A second bound is the sum of upper bounds on the displacements by the motions L. This sum is valid
-if all matched joints have equal axes and equal values. The result is the smaller bound.
+`y_i = u' x (Y - o')`
+`d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')`
 
-**Second derivatives.** `curvature_bounds` computes bounds joint by joint, from the frame to the base.
-
-    D = p_B - p_A:      difference of the frame's positions in A and B
-    S, u, o, t:         screw, axis, point and value of joint i in A
-    S', u', o', t':     screw, axis, point and value of joint i in B
-    rotated vector r:   the derivative with respect to the angle is u x r
-    Y:                  e(S' t') y
-
-Derivatives of y and d with respect to the value of joint i:
-
-    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')
-
-The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i only rotate
-y_i and d_i; these joints do not translate y_i and d_i.
+The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i rotate y_i
+and d_i, but do not translate y_i and d_i.
 """
 
 from __future__ import annotations
@@ -164,10 +159,11 @@ class Support:
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return h after the rotation of the set of points by each of the angles.
 
-        The axis of the rotation contains the origin.
+        The axis of the rotation contains the origin. The value at a grid point is:
 
-            result:             h(along + factor R^T across)
-            along + across:     a grid point's parts along and perpendicular to the axis
+        `h(along + factor R^T across)`
+
+        The vectors `along` and `across` are the grid point's parts parallel and perpendicular to the axis.
 
         Args:
             axis: Unit vector.
@@ -203,14 +199,12 @@ class Support:
     def max_distance(self) -> float:
         """Return an upper bound (m) on the distance of the points from the origin.
 
-        For a grid cell with the corners g_k:
+        Let r be the largest angle between the centre of a grid cell and the cell's corners g_k. A direction u
+        in the cell is the sum of c_k g_k with c_k >= 0. Therefore:
 
-            r:   the angle between g_k and the cell's centre is at most r
-            u:   sum of c_k g_k, c_k >= 0  (a direction in the cell)
-
-            h(u) <= sum of c_k h(g_k)
-            |u| >= cos r  sum of c_k |g_k|
-            h(u) / |u| <= max of h(g_k) / |g_k|  / cos r
+        `h(u) <= sum of c_k h(g_k)`
+        `|u| >= cos r * (sum of c_k |g_k|)`
+        `h(u) / |u| <= (max of h(g_k) / |g_k|) / cos r`
         """
         largest = float((self.values / self.grid.point_norms).max(initial=0.0))
         if math.isnan(largest):  # zero times infinity proves nothing
@@ -253,9 +247,9 @@ def upper_bounds(
     The bounds hold for all joint values within the limits.
 
     Returns:
-        Distance (m) and angle (rad).
-        Both are 0 if nothing differs on the path. A result is inf if no bound is proven.
-        Matched moving joints of different kinds give inf.
+        Bounds on the distance (m) and on the angle (rad). The bounds are 0 if nothing on the frame's path
+        differs. A bound is inf if no bound is proven, for example if moving joints of different kinds are
+        matched.
     """
     steps, pairs = joints_from_first_difference(alignment, variables, frame)
     if not steps and frame.constant_motion is IDENTITY:
@@ -276,7 +270,7 @@ def upper_bounds(
 def joints_from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints on the path to a frame, from the first difference on, and their values."""
+    """Return the matched joints from the first difference to a frame, and the values of these joints."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -333,9 +327,9 @@ def _distance_bound(
 def _displacement_bound(L: FloatArray, reach: float) -> float:
     """Return an upper bound (m) on the displacement of a point y by L.
 
-    For L = (R, p) and |y| <= `reach`:
+    L consists of the rotation R and the translation p, and |y| is at most `reach`. The bound is:
 
-        |(R - 1) y + p| <= |R - 1| reach + |p|
+    `|R - 1| reach + |p|`
     """
     rotation, translation = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return translation + _product(rotation, reach)
@@ -357,8 +351,8 @@ def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after a joint's motion and L."""
-    # A planar or floating joint rotates d without limits, and a floating joint to every direction.
-    # Therefore, h(u) = |u| max |d| is an upper bound on the new support function of d.
+    # A planar or floating joint can rotate d by any angle. Therefore, h(u) = |u| max |d| is an upper bound on
+    # the new support function of d.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -402,10 +396,8 @@ def _prismatic_difference(
 ) -> Support:
     """Return the support function of p' - p for two matched prismatic joints.
 
-        p  = t u:     translation by A's joint
-        p' = t' u':   translation by B's joint
-
-    The difference is largest if each joint value is at a limit.
+    A's joint translates by p = t u, and B's joint translates by p' = t' u'. The difference is largest if each
+    joint value is at a limit.
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
@@ -427,9 +419,9 @@ def _variable_samples(pair: MatchedValues, variables: Variables, grid: Grid) -> 
     Returns:
         (n,) samples, or None in these cases:
 
-            A's and B's joints have different variables
-            the range needs more than `MAX_SAMPLE_INTERVALS` intervals
-            the range is infinite, and a slope is not 0, 1 or -1
+            - The joints have different variables.
+            - The variable's range needs more than `MAX_SAMPLE_INTERVALS` intervals.
+            - The variable's range is infinite, and a slope is not 0, 1 or -1.
     """
     if (name := pair.variable) is None:
         return None
@@ -448,25 +440,21 @@ def _common_variable_difference(
 ) -> Support:
     """Return the support function of d after two matched revolute joints with a common variable.
 
-    Definitions and bounds:
+    Let h be the distance of neighbouring samples of the variable. Between two samples, the bound is the
+    larger bound at the samples plus h^2/8 times a bound on the length of the second derivative.
+    If t' = t + c, the second derivative is:
 
-        samples:        samples of the variable
-        h:              distance of neighbouring samples
-        between them:   larger bound at the two samples + h^2/8 max |second derivative|
+    `d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'`
 
-        x, x':          vectors from the axes of A and B to y
-        P, P':          projections perpendicular to the axes
-        R, R':          rotations about the axes
-        u, u':          directions of the axes
+    In A, x is the vector from the axis u to y, P projects perpendicular to u, and R rotates about u. In B,
+    the symbols have a prime. The component of x' - x perpendicular to the axis is the offset of the axes,
+    and:
 
-        t' = t + c:     d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'
-                        |R' - R| <= 2 |u' - u| + |c|
-                        |P' - P| <= |u' - u|
-                        perpendicular part of x' - x = offset of the axes
+    `|R' - R| <= 2 |u' - u| + |c|`
+    `|P' - P| <= |u' - u|`
 
-        m, m':          slopes of t and t', if they differ
-        r, r':          largest distances of y from the axes
-                        |second derivative| <= m^2 r + m'^2 r'
+    If t and t' have different slopes m and m', the second derivative is at most m^2 r + m'^2 r'. Here r and
+    r' are the largest distances of y from the axes.
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b
@@ -500,13 +488,9 @@ def _independent_difference(
 ) -> Support:
     """Return the support function of e(S' t') y - e(S t) y for independent angles t and t'.
 
-    Definitions and bounds:
-
-        equal axes:       |e(S' t') y - e(S t) y| <= 2 r sin(a/2)
-                          r:  largest distance of y from the axis
-                          a:  largest |t' - t|, at most pi
-
-        different axes:   h = (h of e(S' t') y) + (h of -e(S t) y)
+    If the axes are different, the result is the sum of the support functions of e(S' t') y and -e(S t) y. If
+    the axes are equal, the length of the vector is at most 2 r sin(a/2). Here r is the largest distance of y
+    from the axis, and a is the smaller of pi and the largest |t' - t|.
     """
     G, u = y.grid.points, step.axis_a.direction
     if step.axis_b is not step.axis_a:
@@ -529,13 +513,12 @@ def curvature_bounds(
 ) -> tuple[list[str], FloatArray]:
     """Return upper bounds on the lengths of the second derivatives of D for each pair of variables.
 
-        D = p_B - p_A:   difference of the frame's positions in A and B
-
-    All bounds are inf if paired joints have different variables or slopes.
-    Pairs without effect on D are ignored.
+    D = p_B - p_A is the difference of the frame's positions in A and B. All bounds are inf if paired joints
+    have different variables or slopes. Pairs without effect on D are ignored.
 
     Returns:
-        n names of variables, and (n, n) bounds (m, divided by the units of both variables).
+        Names of the n variables, and (n, n) bounds. The unit of a bound is m, divided by the units of both
+        variables.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
@@ -560,9 +543,9 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield joint indices i and j <= i, and an upper bound on the length of the second derivative of D.
+    """Yield joint indices i and j <= i, and an upper bound on the length of a second derivative of D.
 
-    The derivative is by the values of joints i and j.
+    The second derivative is with respect to the values of joints i and j.
     """
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
@@ -595,7 +578,7 @@ def _length_bound_at_base(
 ) -> float:
     """Return an upper bound on the length of d at the base.
 
-    `supports` contains the support functions of d and y before the motion L of `steps[-1]` is applied.
+    `supports` contains the support functions of d and y without the motion L of `steps[-1]`.
     """
     supports = supports_after_constant_motion(steps[-1], *supports)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
@@ -611,10 +594,7 @@ def _length_bound_at_base(
 def _derivative_supports(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _SupportPair:
-    """Return bounds on the derivatives of d and y with respect to a joint's value.
-
-    The motion L is not included.
-    """
+    """Return bounds on the derivatives of d and y with respect to a joint's value, without the motion L."""
     if step.kind != "turns":
         u, other = step.axis_a.direction, step.axis_b.direction
         return point_support(d.grid, other - u), point_support(d.grid, other)
@@ -623,12 +603,12 @@ def _derivative_supports(
 
 
 def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _SupportPair:
-    """Return upper bounds on the support functions of two derivatives.
+    """Return upper bounds on the support functions of these derivatives.
 
-        d_i = u x d + (u' - u) x (y - o') + u x (o - o')
-        y_i = u' x (y - o')
+    `d_i = u x d + (u' - u) x (y - o') + u x (o - o')`
+    `y_i = u' x (y - o')`
 
-    The arguments d and y are given after the joint's motion; x is the cross product.
+    The arguments d and y contain the joint's motion, and x is the cross product.
     """
     G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
@@ -642,7 +622,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a copy of a step without translations; a translation does not change a free vector."""
+    """Remove the translations of a matched joint, because a translation does not change a free vector."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
@@ -652,10 +632,10 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 def relevant_joints(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints that affect the length of D, with their values.
+    """Return the matched joints that affect the length of D, and the values of these joints.
 
-    The result begins at the first joint that differs, or at an earlier joint that has the same variable as a
-    later joint of the result.
+    The result begins at the first joint that differs. If an earlier joint shares a variable with a joint of
+    the result, the result begins at the earlier joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),
