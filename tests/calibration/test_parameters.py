@@ -160,7 +160,7 @@ def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fif
     assert difference.max() < model.chain.rounding_bound(values)
 
 
-@pytest.mark.parametrize("frames", [{"tip": "three"}, {"base": "three"}])
-def test_a_table_with_another_tip_or_base_is_refused(frames: dict[str, str]) -> None:
+@pytest.mark.parametrize(("tip", "base"), [("three", None), (None, "three")])
+def test_a_table_with_another_tip_or_base_is_refused(tip: str | None, base: str | None) -> None:
     with pytest.raises(InputError, match="a table is fitted from its base to its tip"):
-        calibrate(table(DHConvention.STANDARD), **frames)
+        calibrate(table(DHConvention.STANDARD), tip=tip, base=base)
