@@ -212,6 +212,59 @@ def test_a_tilted_plane_of_a_planar_joint_is_a_difference() -> None:
     assert certified(found, a, b)
 
 
+# -- chains without common names ---------------------------------------------------------------------
+
+
+def random_chain(kinds: str, seed: int, tip: str = "tip") -> Robot:
+    """Return a chain of revolute (R) and prismatic (P) joints with random axes and origins."""
+    rng = np.random.default_rng(seed)
+    links = [*(f"{tip}_{i}" for i in range(len(kinds))), tip]
+    joints = [
+        joint(
+            f"{tip}_j{i}",
+            "revolute" if kind == "R" else "prismatic",
+            links[i],
+            links[i + 1],
+            'xyz="{} {} {}" rpy="{} {} {}"'.format(*rng.normal(size=6)),
+            " ".join(map(str, rng.normal(size=3))),
+            limit(-1, 1),
+        )
+        for i, kind in enumerate(kinds)
+    ]
+    return built(*joints, verify=False)
+
+
+@pytest.mark.parametrize("kinds", ["RPR", "RPPR", "PPPR", "PRPRPR", "RRPPRR", "RPPPRR"])
+def test_prismatic_joints_between_revolute_joints_need_no_common_names(kinds: str) -> None:
+    for seed in range(3):
+        a = random_chain(kinds, seed)
+        b = loaded(pairs.disguised(a.tree, seed))
+        found = urdfkin.same(a, b, bounds=False)
+        assert found.verdict is Verdict.SAME_AFTER, seed
+        assert moves_alike(found, a, b)
+
+
+@pytest.mark.parametrize("common", [["base"], ["tip"], ["base", "tip"]])
+def test_a_common_base_and_a_common_tip_fix_the_zeros_of_prismatic_joints(common: list[str]) -> None:
+    for seed in range(3):
+        a = random_chain("RPPR", seed)
+        names = {"base": a.tree.links[0], "tip": a.tree.links[-1]}
+        offsets = {joint.name: 0.1 * (i + 1) for i, joint in enumerate(a.tree.joints)}
+        joints = {joint.name: f"other_{joint.name}" for joint in a.tree.joints}
+        links = {link: link if link in map(names.get, common) else f"other_{link}" for link in a.tree.links}
+        moved = pairs.with_names(pairs.with_zeros_moved(a.tree, offsets), joints, links)
+        b = loaded(moved if "base" in common else pairs.on_a_stand(moved))
+        found = urdfkin.same(a, b, bounds=False)
+        assert found.verdict is Verdict.SAME_AFTER, seed
+        assert moves_alike(found, a, b)
+
+
+def test_a_chain_with_a_displaced_axis_differs_without_common_names() -> None:
+    a = random_chain("RPRRRP", 0)
+    b = loaded(pairs.disguised(pairs.lengthened(a.tree, 1e-6), 0))
+    assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
+
+
 # -- the order of joints -----------------------------------------------------------------------------
 
 AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}

@@ -27,7 +27,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.kinematics.rotation import exp_rotation, skew
+from urdfkin.kinematics.rotation import exp_rotation, log_rotation, skew
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
@@ -347,51 +347,71 @@ def later_axes(
 _REFINEMENT_STEPS = 10
 
 
-def refine_choices(alignment: Alignment) -> AlignmentChoices:
+def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoices:
     """Solve for B's root pose and all zero offsets together, so that all axes of B coincide with axes of A.
 
-    The search computes one zero offset after another. If axes are nearly parallel, the error of one offset
-    displaces later axes by much more than the rounding error. All axes together determine the offsets well.
+    The search computes one zero offset after another, and fails if an axis depends on two unknown offsets. If
+    axes are nearly parallel, the rounding error of one offset displaces later axes by much more.
 
     Args:
-        alignment: Every joint is revolute or prismatic, and the axes nearly coincide.
+        alignment: Every joint is revolute or prismatic.
+        with_links: Whether matched links of B must also coincide with links of A.
     """
-    size, n = size_of(alignment.a, alignment.b), len(alignment.steps)
-    edges = {edge.joint: edge for edge in alignment.b.edges}
-    root_body = alignment.b.body_of[alignment.base[1]]
+    size = size_of(alignment.a, alignment.b)
+    turns = np.array([step.kind == "turns" for step in alignment.steps])
+    # A rotation of 1 rad and a shift of `size` have about the same effect.
+    scales = np.concatenate(([1.0] * 3, [size] * 3, np.where(turns, 1.0, size)))
     X, offsets = alignment.X, np.array([step.offset for step in alignment.steps])
     for _ in range(_REFINEMENT_STEPS):
-        # For each joint pair: B's body after the joint, the body's motion, and its twists (6, 6 + n).
-        # The twists are in A's root frame. Columns 0 to 5 belong to B's root pose, the rest to zero offsets.
-        after = list[tuple[int, FloatArray, FloatArray]]()
-        root = root_body, X, np.eye(6, 6 + n)
-        J, r = np.zeros((n, 2, 3, 6 + n)), np.zeros((n, 2, 3))
-        for i, step in enumerate(alignment.steps):
-            body, motion, twists = after[step.previous] if step.previous >= 0 else root
-            edge, turns = edges[step.b], step.kind == "turns"
-            screw = alignment.b.screw(edge)
-            screw = screw.reverse() if edge.outer == body else screw
-            axis_b = screw.transform(motion)
-            u, p = axis_b.direction, axis_b.point
-            across = np.eye(3) - np.outer(step.axis_a.direction, step.axis_a.direction)
-            J[i, 0] = -size * step.sense * skew(u) @ twists[:3]
-            r[i, 0] = size * (step.sense * u - step.axis_a.direction)
-            if turns:
-                J[i, 1] = across @ (twists[3:] - skew(p) @ twists[:3])
-                r[i, 1] = across @ (p - step.axis_a.point)
-            twists = twists.copy()
-            twists[:, 6 + i] = np.concatenate((u, np.cross(p, u)) if turns else (np.zeros(3), u))
-            motion = motion @ screw_motion(screw, offsets[i], turns=turns)
-            after.append((edge.other_body(body), motion, twists))
-        # A rotation of 1 rad and a shift of `size` have about the same effect.
-        scales = np.ones(6 + n)
-        scales[3:6] = size
-        scales[6:] = [1.0 if step.kind == "turns" else size for step in alignment.steps]
-        change = scales * np.linalg.lstsq(J.reshape(-1, 6 + n) * scales, -r.ravel(), rcond=None)[0]
+        r, J = _errors(alignment, X, offsets, size, with_links=with_links)
+        change = scales * np.linalg.lstsq(J * scales, -r, rcond=None)[0]
         X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
+        # If two axes nearly coincide, a step can add many turns. Large angles have large rounding errors.
+        offsets = np.where(turns & (np.abs(offsets) > pi), np.remainder(offsets + pi, 2.0 * pi) - pi, offsets)
     joints = alignment.a.tree.joints
     zeros = {joints[s.a].name: (s.sense, float(x)) for s, x in zip(alignment.steps, offsets, strict=True)}
     return replace(alignment.choices, X=X, zeros=zeros)
+
+
+def _errors(
+    alignment: Alignment, X: FloatArray, offsets: FloatArray, size: float, *, with_links: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the differences (k,) of axes and links, m, and their derivatives (k, 6 + n).
+
+    The derivatives are with respect to a twist of B's root in A's root frame, and to the n zero offsets.
+    Angles are multiplied by `size`.
+    """
+    b, n = alignment.b, len(offsets)
+    edges = {edge.joint: edge for edge in b.edges}
+    root = b.body_of[alignment.base[1]], X, np.eye(6, 6 + n)
+    # For each joint pair: B's body after the joint, its motion, and the derivatives (6, 6 + n) of its twist.
+    after = list[tuple[int, FloatArray, FloatArray]]()
+    errors, derivatives = list[FloatArray](), list[FloatArray]()
+    for i, step in enumerate(alignment.steps):
+        body, motion, twist = after[step.previous] if step.previous >= 0 else root
+        edge, turns = edges[step.b], step.kind == "turns"
+        screw = b.screw(edge).reverse() if edge.outer == body else b.screw(edge)
+        axis, target = screw.transform(motion), step.axis_a
+        u, p = axis.direction, axis.point
+        errors.append(size * (step.sense * u - target.direction))
+        derivatives.append(-size * step.sense * skew(u) @ twist[:3])
+        if turns:
+            across = np.eye(3) - np.outer(target.direction, target.direction)
+            errors.append(across @ (p - target.point))
+            derivatives.append(across @ (twist[3:] - skew(p) @ twist[:3]))
+        twist = twist.copy()
+        twist[:, 6 + i] = np.concatenate((u, np.cross(p, u)) if turns else (np.zeros(3), u))
+        after.append((edge.other_body(body), motion @ screw_motion(screw, offsets[i], turns=turns), twist))
+    for frame in alignment.frames if with_links else ():
+        if frame.tool is not IDENTITY:
+            continue
+        _, motion, twist = after[frame.previous] if frame.previous >= 0 else root
+        T = motion @ b.zero_poses[frame.b]
+        errors.append(size * log_rotation(T[:3, :3] @ frame.zero_pose[:3, :3].T))
+        errors.append(T[:3, 3] - frame.zero_pose[:3, 3])
+        derivatives.append(size * twist[:3])
+        derivatives.append(twist[3:] - skew(T[:3, 3]) @ twist[:3])
+    return np.concatenate(errors), np.concatenate(derivatives)
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:

@@ -835,23 +835,34 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
 
 
 def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Solve for the base pose of a table and all zero offsets together, if the axes do not agree.
+    """If axes or links do not agree, solve for B's root pose and all zero offsets together.
 
-    The frames of a table do not determine zero offsets. If axes are nearly parallel, they determine the zero
-    offsets only together.
+    For a table, start also from alignments with larger tolerances. The frames of a table do not determine
+    zero offsets. If axes are nearly parallel, they determine the zero offsets only together.
     """
-    if best.all_joints_agree or not best.has_free_frames or best.only_a or best.only_b:
+    agrees = best.all_joints_agree if best.has_free_frames else best.is_complete
+    if agrees or best.only_a or best.only_b or not best.steps:
         return best
-    a, b = best.a, best.b
-    size, look_ahead = size_of(a, b), LookAhead(MAX_LOOK_AHEAD_PAIRS)
-    for angle in LARGER_TOLERANCES:
-        tolerance = Tolerance(angle, angle * size)
-        rough = _best_alignment(a, b, name_map, None, look_ahead, tolerance, best.base)
-        if rough.all_joints_agree and all(step.kind in ("turns", "prismatic") for step in rough.steps):
-            exact = _best_alignment(a, b, rough.names, refine_choices(rough))
-            if exact.all_joints_agree:
+    for start in _starts_of_refinement(best, name_map):
+        if any(step.kind not in ("turns", "prismatic") or step.kind_difference for step in start.steps):
+            continue
+        for with_links in (False,) if best.has_free_frames else (True, False):
+            refined = refine_choices(start, with_links=with_links)
+            exact = _best_alignment(best.a, best.b, start.names, refined)
+            if exact.all_joints_agree and _is_better_alignment(exact, best):
                 return exact
     return best
+
+
+def _starts_of_refinement(best: Alignment, name_map: Mapping[str, str]) -> Iterator[Alignment]:
+    yield best
+    if best.has_free_frames:
+        size, look_ahead = size_of(best.a, best.b), LookAhead(MAX_LOOK_AHEAD_PAIRS)
+        for angle in LARGER_TOLERANCES:
+            tolerance = Tolerance(angle, angle * size)
+            rough = _best_alignment(best.a, best.b, name_map, None, look_ahead, tolerance, best.base)
+            if rough.all_joints_agree:
+                yield rough
 
 
 def _best_alignment(
