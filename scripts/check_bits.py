@@ -160,7 +160,7 @@ def digest(now: Arrays) -> str:
 
 
 def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference as a fraction of the bound."""
+    """Return the largest difference from the stored results, divided by the stored error bound."""
     if have_equal_bits(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])

@@ -30,7 +30,7 @@ MAX_STRICT = MAX_SAME = 400
 
 
 def compare_arm(seed: int) -> Iterator[TableComparison]:
-    """Compare both tables of an arm with the arm."""
+    """Compare the standard table and the modified table of an arm with the arm."""
     tree = nearly_coincident(seed)
     table = disguised(make_dh_table(tree, "tip"), seed)
     for convention in CONVENTIONS:

@@ -106,7 +106,7 @@ def find_near_tests(path: Path) -> list[str]:
 class NamedMutant:
     claim: str  # the mistake that must be detected
     #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`.
-    #: If the code is outside functions, the full name of the module.
+    #: For code outside functions, this is the full name of the module.
     function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`

@@ -46,7 +46,7 @@ class Row:
 
     Attributes:
         numbers: Number of values in one result.
-        size: Number of joints, frames or configurations.
+        size: Number of joints, frames or configurations, in a section that varies this number. Otherwise 0.
         n: Number of configurations in a call.
     """
 

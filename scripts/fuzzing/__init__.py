@@ -5,8 +5,8 @@ from dataclasses import dataclass
 PASSED = (
     "refused",
     "verified",
-    "not verified, with a finding that states the reason",
-    "too large to compute, with a finding that states the reason",
+    "not verified; a finding states the reason",
+    "too large to compute; a finding states the reason",
 )
 
 

@@ -87,7 +87,7 @@ def _evaluate_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome
 def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
     too_large = "a result is not a finite number"
     if _SIZES & {finding.code for finding in findings}:
-        too_large = "too large to compute, with a finding that states the reason"
+        too_large = "too large to compute; a finding states the reason"
     try:
         for computation, result in compute_all(robot, seed=0):
             if not np.isfinite(result).all():
@@ -108,11 +108,11 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
         return Outcome("verified")
     for finding in findings:
         if finding.pinocchio_reading is not None:
-            return Outcome("not verified, with a finding that states the reason", finding.code)
+            return Outcome("not verified; a finding states the reason", finding.code)
     if (reason := robot.verifier.find_refusal()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
     texts = "; ".join(str(w.message) for w in warned)
-    return Outcome("not verified, and no finding states the reason", texts)
+    return Outcome("not verified; no finding states the reason", texts)
 
 
 def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:

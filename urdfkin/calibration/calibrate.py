@@ -71,8 +71,8 @@ _MAX_UNCERTAINTY_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7).
-#: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
+#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7) in the tip's
+#: frame. L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
 _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
@@ -257,9 +257,10 @@ def calibrate(
         tip: Name of a link or joint; the robot's tip when None. None for a table.
         base: Name of a link or joint; the robot's base frame when None. None for a table.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
-            "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
-            six numbers of each joint origin, or the cells of a table. A table's row has the cell beta only if
-            the next axis is nearly parallel or beta is not 0. "gains": the scale factors of the joint values.
+            "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "gains":
+            the scale factors of the joint values. "origins": six numbers of each joint origin. For a table,
+            "origins" means the cells of the table. A row has the cell beta only if the next axis is nearly
+            parallel or beta is not 0.
         noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.

@@ -1,10 +1,10 @@
 """Identify and fit the parameters of a model from measured poses.
 
-**Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
-a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
-parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value, which takes
-rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
-lower bound, so no tolerance is needed.
+**Identifiability.** A change of parameters without effect on the measurements cannot be identified. The null
+space of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
+identifiable parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value. The
+bound takes rounding errors into account (Weyl's inequality). The rank is the number of singular values with
+a positive lower bound, so no tolerance is needed.
 
 Some changes of a joint's frame can be compensated by an opposite change of the next frame (Everett, Driels
 and Mooring, 1987):
@@ -31,7 +31,8 @@ and cancel each other.
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum:
 
-    J, r                weighted Jacobian, weighted residuals
+    J                   weighted Jacobian
+    r                   weighted residuals
     C = (J^T J)^-1      covariance of the parameters
     H = J C J^T         hat matrix
     1 - H_ii            redundancy of measurement i
@@ -282,8 +283,8 @@ class Fit:
         parameter_values: (p,) values of all parameters.
         residuals: (s, 6) or (s, 3) measured minus computed values, in the measurements' frame, m and rad.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in their units. Infinite if the redundancy is
-            0 and the noise is not stated.
+        covariance: (k, k) covariance of the fitted parameters, in their units. If the noise is not stated,
+            a fit without redundancy has an infinite covariance.
         redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         chi_squares: (s,) chi^2 statistic of each pose.
     """
@@ -481,8 +482,8 @@ def select_significant(
 ) -> NDArray[np.bool_]:
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step sets the least significant change to 0, and updates correlated changes. `always_selected` marks
-    the parameters that are selected in any case. Unknown covariances are inf.
+    Each step sets the least significant change to 0, and estimates the other changes again under this
+    condition. `always_selected` marks the parameters that are always selected. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]

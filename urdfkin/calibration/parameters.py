@@ -1,9 +1,9 @@
-"""Model a path with a URDF's origins or a table's cells as parameters, and compute its Jacobian.
+"""Model a path by parameters, and compute the Jacobian of the tip's pose with respect to the parameters.
 
-A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint
-origin of a URDF and a row of a Denavit-Hartenberg table have this form. An elementary motion is a rotation
-by an angle or a translation by a length. The angle or length is a parameter or the value of a joint. A joint
-can have a gain g:
+The parameters are numbers of a URDF's joint origins, or cells of a Denavit-Hartenberg table. A model is a
+path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint origin and a row
+of a table have this form. An elementary motion is a rotation by an angle or a translation by a length. The
+angle or length is a parameter or the value of a joint. A joint can have a gain g:
 
     q              value of the joint
     (1 + g) q      angle or length of the joint's motion
@@ -11,8 +11,8 @@ can have a gain g:
     q D            derivative of the tip's pose by g
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip also has six parameters. Other fixed joints have no parameters. On a path from parent
-to child, their parameters would have the same effect as those of a later joint.
+directly before the tip has the same six parameters. Other fixed joints have no parameters. On a path from
+parent to child, the parameters of a fixed joint would have the same effect as those of a later joint.
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis
@@ -25,9 +25,9 @@ robot's base in the instrument's frame. The path ends with the motions of `tool`
 the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
-`PARALLEL_TOLERANCE`, the row also has beta, Hayati's fifth parameter. A row with a nonzero beta always has
-this parameter. In a row with parallel axes, d has the same effect as parameters of other rows. A tilt of the
-axis in any direction needs both alpha and beta.
+`PARALLEL_TOLERANCE`, the row also has Hayati's fifth parameter beta. If beta is not 0 in the original table,
+beta is always a parameter. In a row with parallel axes, d has the same effect as parameters of other rows. A
+tilt of the axis in any direction needs both alpha and beta.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ParametricMotion(ElementaryMotion):
-    """A motion by an angle or length that is a parameter or the value of a joint.
+    """An elementary motion that depends on a parameter or a joint.
 
     Attributes:
         parameter: Index of the parameter. For the motion of a joint: index of the gain; None without a gain.
