@@ -1,4 +1,4 @@
-"""Compare the speed of urdfkin, Pinocchio and other libraries at the same work, in one process.
+"""Compare the speed of urdfkin, Pinocchio and other libraries for the same computations, in one process.
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 

@@ -144,7 +144,7 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # Differences that the libraries document, by the footnote's letter.
+    notes: dict[str, Any] = {}  # Maps a footnote's letter to a difference that a library documents.
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:

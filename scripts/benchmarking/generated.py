@@ -6,9 +6,9 @@ constants, and omits products with 0 and 1. The code computes several configurat
 vectors of doubles; `generated.c` contains the loop over the configurations. The measured time includes sine,
 cosine and the transposition of the arrays.
 
-The generated code does not check inputs. Its results are wrong if an input is not finite, or if an angle
-has 10^15 turns or more. On processors without fused multiply-adds, a million turns cause errors of 1e-9 in
-sine and cosine. The generated code computes sine and cosine without urdfkin's correction of the last digit.
+The generated code does not check inputs. Infinite inputs, nan, and angles of 10^15 turns or more cause wrong
+results. On processors without fused multiply-adds, a million turns cause errors of 1e-9 in sine and cosine.
+The generated code computes sine and cosine without urdfkin's correction of the last digit.
 """
 
 import ctypes

@@ -109,7 +109,7 @@ def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) ->
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
     """Measure chains with the given numbers of joints.
 
-    Configurations of a batch: numbers / (6 * joints), but at least 16.
+    A batch of Jacobians has about `numbers` elements, and at least 16 configurations.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)

@@ -146,13 +146,13 @@ class Calls:
     #: The value of the last line is the result.
     lines: tuple[str, ...]
     #: Lines that write the result of configuration k into `out[k]`.
-    #: None: the value of the last line in `lines` is written into `out[k]`.
+    #: If `store` is None, the benchmark writes the value of the last line in `lines` into `out[k]`.
     store: tuple[str, ...] | None = None
     #: `order[i]` is urdfkin's index of the library's coordinate i.
-    #: None: the library and urdfkin have the same order of coordinates.
+    #: If `order` is None, the library and urdfkin have the same order of coordinates.
     order: list[int] | None = None
     #: Shape of the library's result for one configuration.
-    #: None: the shape of urdfkin's result.
+    #: If `shape` is None, the result has the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
     #: Function that converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)

@@ -28,7 +28,7 @@ class Outcome:
     """The outcome of a test.
 
     Attributes:
-        result: An element of `PASSED`, or a failure, for example "disagrees with Pinocchio".
+        result: Short description. The test failed if the description is not in `PASSED`.
     """
 
     result: str

@@ -26,19 +26,17 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Codes of findings about huge numbers.
-#: With these findings, results may be inf or nan.
+#: Codes of findings about huge numbers, for which results may be inf or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of links and joints whose frames one call computes.
 FRAMES_PER_CALL = 12
-#: Calls for several frames are compared with calls for single frames.
-#: Maximum number of calls for single frames.
+#: Maximum number of calls for single frames, which are compared with calls for several frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Standard deviation of each coordinate of the far base's position, in metres.
 FAR = 1e6
-#: Quantities that one call computes for several frames.
-#: The value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
+#: Quantities that one call computes for several frames, with the number of inputs.
+#: The inputs are 1: q, 2: q and v, 3: q, v and a.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 

@@ -99,9 +99,9 @@ class Calibration:
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to u_measured / u_random. The
-            first is the uncertainty at the measured configurations. The second is the uncertainty at equally
-            many random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to a ratio of two uncertainties.
+            The uncertainty at the measured configurations is divided by the uncertainty at equally many
+            random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -478,8 +478,8 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
 
-    The original geometry is often special, with fewer identifiable parameters. For example, the tip can lie
-    on the last joint's axis.
+    Fewer parameters may be identifiable at the original values. For example, the original tip may lie on the
+    last joint's axis.
     """
     again = identify(
         model,

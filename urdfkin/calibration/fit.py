@@ -89,8 +89,7 @@ from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A Jacobian column is a candidate for the next fitted parameter if
-#:     length of its remainder >= _PIVOT_FRACTION * length of the longest remainder.
+#: The remainder of a candidate column has at least this fraction of the length of the longest remainder.
 _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3

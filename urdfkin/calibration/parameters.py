@@ -106,7 +106,7 @@ class ParametricChain:
     def characteristic_length(self) -> float:
         """Sum (m) of the model's lengths, or 1 if the sum is 0.
 
-        An angle times this length is a distance.
+        The product of an angle and the characteristic length is a distance.
         """
         constant = [
             float(np.linalg.norm(step[:3, 3]))
@@ -205,7 +205,7 @@ ORIGIN_PARAMETERS = (
     ("rz", True, 2),
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
-#: Order of preference for the parameters of a revolute (True) or prismatic (False) joint.
+#: Parameters of a joint in order of preference; True: revolute joint, False: prismatic joint.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
 #: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
 #: Further parameters move the joint's frame, but not its axis.

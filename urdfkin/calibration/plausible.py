@@ -181,7 +181,7 @@ class FitWithData:
     def half_turn_zeros(self) -> list[str]:
         """Describe the joints with a change of the zero position by about half a turn.
 
-        Wrong signs of the next joint's values can cause this change.
+        Wrong signs of the next joint's values can change the zero position by half a turn.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
