@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # Import urdfkin and `scripts` from this checkout.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # Idle threads of PyTorch slow other libraries.
+# Without this setting, idle threads of PyTorch make other libraries slower.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from scripts.benchmarking import sections as measured
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender

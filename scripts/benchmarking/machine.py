@@ -25,9 +25,8 @@ ROOT = Path(__file__).parents[2]
 #: `EMPTY`: the kernel cache is empty.
 #: `STORED`: the kernel cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` whose first call compiles a kernel.
-#: Each method has a number of inputs:
-#: 1: q; 2: q and v; 3: q, v and a.
+#: Methods of `Robot` that compile a kernel at their first call, with the number of inputs.
+#: The inputs are 1: q, 2: q and v, 3: q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,

@@ -1,8 +1,8 @@
 """Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
 
 A fit that is not plausible (`plausible.py`) is refused. Without `write_all`, joint parameters that changed by
-at most two standard deviations get their original values. The other parameters are fitted again, and written
-if the file can store them. These include all identifiable parameters of base and tool.
+at most two standard deviations get their original values. The other parameters of joints and all identifiable
+parameters of base and tool are fitted again. Parameters that the file can store are then written.
 
 `read_poses` reads measured poses:
 

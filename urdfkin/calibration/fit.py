@@ -94,7 +94,7 @@ _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The text "same effect as ..." omits fitted parameters with at most this fraction of the effect.
+#: The text "same effect as ..." omits a fitted parameter that contributes at most this fraction of the effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -262,8 +262,8 @@ class Noise:
     """Standard deviations of the measurements.
 
     Attributes:
-        metres: For each position coordinate, m.
-        radians: For the rotation about each axis, rad.
+        metres: Standard deviation (m) of each position coordinate.
+        radians: Standard deviation (rad) of the rotation about each axis.
     """
 
     metres: float
@@ -337,7 +337,7 @@ def compute_residuals(
     """Return residuals along the axes of the measurements' frame.
 
     Returns:
-        (s, 3) for positions, or (s, 6) for poses, m and rad.
+        (s, 3) residuals (m) of positions, or (s, 6) residuals (m and rad) of poses.
     """
     return _residuals_of_poses(measurements, model.chain.poses(measurements.joint_values, parameter_values))
 

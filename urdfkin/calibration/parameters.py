@@ -144,7 +144,7 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return tip poses, and their derivatives with respect to the parameters.
 
-        `frames` is `self.frames(joint_values, parameter_values)`, if already computed.
+        `frames` is the result of the method `frames`; None if it has not been computed.
 
         Returns:
             (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
@@ -194,8 +194,9 @@ class ParametricChain:
 PARALLEL_TOLERANCE = math.radians(5.0)
 
 PARAMETER_SETS = ("base", "tool", "offsets", "origins", "gains")
-#: Name, kind and axis of each parameter of a joint origin. True means a rotation, False a translation.
-#: The axis is the index of a coordinate axis. The new origin is the product of the motions in this order.
+#: Name, kind and axis of each parameter of a joint origin.
+#: The kind is True for a rotation, False for a translation. The axes 0, 1 and 2 are x, y and z.
+#: The new origin is the product of the motions in this order.
 ORIGIN_PARAMETERS = (
     ("x", False, 0),
     ("y", False, 1),
@@ -205,7 +206,7 @@ ORIGIN_PARAMETERS = (
     ("rz", True, 2),
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
-#: Parameters of a joint in order of preference; True: revolute joint, False: prismatic joint.
+#: Parameters in order of preference; False: prismatic joint, True: another joint, base or tool.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
 #: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
 #: Further parameters move the joint's frame, but not its axis.

@@ -74,7 +74,7 @@ _CHANGE_MARGIN_SIGMAS = 5.0
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
 #: The corrections are sorted by `_Trial.error_before`, the smallest first.
-#: Only for this number of corrections, all parameters are fitted again.
+#: All parameters are fitted again for the first `_MAX_FITS` corrections only.
 _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.
 #: urdfkin tries these shifts (number of rows).
@@ -120,9 +120,8 @@ class FitWithData:
     def reach(self) -> float:
         """Reach of the original model at the measured configurations, m.
 
-        The reach is the largest distance between the tip and the base, or between the tip and a joint axis.
-        Only revolute joints with a parameter for the zero position count.
-        The reach is at most `characteristic_length`.
+        The reach is the largest distance of the tip from the base, or from the axis of a parameter rz or
+        theta. The reach is at most `characteristic_length`.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
