@@ -221,8 +221,7 @@ class Case:
             Largest difference from urdfkin's pose, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Sine and cosine have rounding errors.
-        # The bound is therefore not zero, even if all lengths are zero.
+        # Even if all lengths are zero, sine and cosine have rounding errors, so `allowed` must not be zero.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

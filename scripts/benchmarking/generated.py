@@ -90,7 +90,7 @@ def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
     """Compile the C code.
 
     Returns:
-        Function of the batch size and the addresses of q, v, a, `out`.
+        The compiled function. Its arguments are the batch size and the addresses of q, v, a and `out`.
     """
     plan, folder = workload.plan, workload.folder
     is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE

@@ -21,7 +21,7 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Names of two times (ms) until a process has its first result.
+#: Keys of the time (ms) that a process needs for its first result.
 #: `EMPTY`: the kernel cache is empty.
 #: `STORED`: the kernel cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"

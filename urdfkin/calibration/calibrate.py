@@ -252,8 +252,8 @@ def calibrate(
         q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
             could be identified.
         poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m. If `fit` contains
-            "base", the poses are in the instrument's frame. If `fit` contains "tool", they are poses of the
-            target.
+            "base", the poses are in the instrument's frame. If `fit` contains "tool", the poses are those of
+            the target.
         tip: Name of a link or joint; the robot's tip when None. None for a table.
         base: Name of a link or joint; the robot's base frame when None. None for a table.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.

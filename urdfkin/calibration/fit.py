@@ -94,7 +94,7 @@ _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The text "same effect as ..." omits a fitted parameter that contributes at most this fraction of the effect.
+#: The text "same effect as ..." omits fitted parameters that contribute at most this fraction of the effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -216,8 +216,7 @@ def join_names(names: Iterable[str], limit: int) -> str:
 #: Therefore, 0.5 separates 0 from 1 in spite of rounding errors.
 _MIN_TOTAL_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
-#: For an eigenvalue of zero, the fit adapts completely to a measurement error along the eigenvector.
-#: The residuals do not show this error.
+#: A measurement error along an eigenvector with the eigenvalue zero does not change the residuals.
 _EIGENVALUE_CUTOFF = 1e-9
 #: Maximum number of estimates of the noise.
 _MAX_NOISE_ESTIMATES = 20

@@ -74,9 +74,9 @@ class ParametricMotion(ElementaryMotion):
     """An elementary motion that depends on a parameter or a joint.
 
     Attributes:
-        parameter: Index of the parameter. For the motion of a joint: index of the gain; None without a gain.
+        parameter: Index of the parameter. A joint's motion has the index of the gain; None without a gain.
         joint: Index of the joint; None if the angle or length does not depend on a joint.
-        sense: -1 if the path leads from child to parent, or if the row subtracts the joint's value. Else 1.
+        sense: 1 or -1. The angle or length is multiplied by this sign.
     """
 
     parameter: int | None
@@ -177,7 +177,7 @@ class ParametricChain:
         """Bound the rounding error of each number from `poses_and_jacobian`.
 
         Returns:
-            Bound, m; divide by `characteristic_length` for radians.
+            Bound for positions (m). The bound divided by `characteristic_length` is valid for angles (rad).
         """
         slides = [
             motion.joint
