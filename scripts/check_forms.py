@@ -77,8 +77,8 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: Function of jobs and a folder; returns one array of poses for each job.
-#: The function may write files into the folder.
+#: A function that runs the code of jobs, and returns one array of poses for each job.
+#: The function may write files into the given folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 

@@ -90,7 +90,7 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Beginning of a verdict, and the word that replaces the verdict.
+#: Short forms of verdicts. A verdict that begins with a key is replaced by the value.
 #: For example, "single precision" replaces "same up to single precision".
 #: The first matching key counts.
 _SHORT = {

@@ -38,7 +38,7 @@ class Contender:
     module: str
     calls: Callable[[Workload, str], Iterator[Calls]] | None = None
     #: Function that yields the timed tasks for batches.
-    #: If None, the benchmark calls the library once for each configuration.
+    #: Without this function, the benchmark calls the library once for each configuration.
     batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 

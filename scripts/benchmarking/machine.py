@@ -105,7 +105,7 @@ def _measure_peak(robot: str, frame: str, quantity: str, count: str, kind: str) 
         with use_only("compiled"):
             # This call loads compiled code and starts threads.
             method(*warm_up_inputs, frame, verify=False, threads=2)
-        Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM, the maximum of VmRSS.
+        Path("/proc/self/clear_refs").write_text("5")  # The 5 resets VmHWM, the maximum of VmRSS.
         before = _read_bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         peak = _read_bytes("VmHWM") - before + (out.nbytes if out is not None else 0)

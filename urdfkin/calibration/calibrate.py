@@ -621,7 +621,8 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest accepted error of a rotation matrix or of a quaternion's length; numbers in files are rounded.
+#: Largest accepted error of a rotation matrix, or of the length of a quaternion.
+#: The tolerance is large, because numbers in files are rounded.
 _ROTATION_TOLERANCE = 1e-3
 _POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))

@@ -521,7 +521,7 @@ _MAX_START_REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
 _TARGET_CONVERGENCE = 1e-9
 #: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
-#: If positions are in millimetres by mistake, this quotient is about 1000.
+#: The quotient is about 1000 if positions are in millimetres by mistake.
 _MAX_SPREAD_RATIO = 100.0
 
 

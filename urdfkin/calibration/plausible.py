@@ -283,7 +283,7 @@ class _Correction:
 
     Attributes:
         first_pose: Index of the pose that belongs to the first row of `q`.
-        end_pose: Index after the pose that belongs to the last row of `q`; None: the last pose belongs to it.
+        end_pose: Index of the pose that belongs to the last row of `q`, plus 1; None for the last pose.
     """
 
     reason: str
