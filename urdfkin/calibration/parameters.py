@@ -362,11 +362,11 @@ class _ModelBuilder:
         )
         groups = tuple(
             tuple(
-                index_of[*owner, what]
-                for what in preferences.get(owner[0], _ORIGIN_PREFERENCES[True])
-                if (*owner, what) in index_of
+                index_of[element, is_base_or_tool, what]
+                for what in (_ORIGIN_PREFERENCES[True] if is_base_or_tool else preferences[element])
+                if (element, is_base_or_tool, what) in index_of
             )
-            for owner in owners
+            for element, is_base_or_tool in owners
         )
         chain = ParametricChain(
             Path(tuple(self.steps)), tuple(self.parameters), np.array(self.initial_values)

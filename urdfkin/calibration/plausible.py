@@ -202,7 +202,11 @@ class FitWithData:
             levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
             least = _MAX_ERROR_OF_REACH * self.reach
             parameters = zip(model.chain.parameters, levers.tolist(), strict=True)
-            near = {p.element for p, lever in parameters if p.name in ("rz", "theta") and lever < least}
+            near = {
+                p.element
+                for p, lever in parameters
+                if p.name in ("rz", "theta") and not p.is_base_or_tool and lever < least
+            }
         deviations = np.sqrt(np.diag(fitted.covariance))
         for k, deviation in zip(self.identification.free_parameters, deviations.tolist(), strict=True):
             parameter = model.chain.parameters[k]
