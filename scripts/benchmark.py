@@ -117,7 +117,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # at exit, this library prints warnings about memory leaks
+    if "roboticstoolbox" in sys.modules:  # At exit, the toolbox would print warnings about memory leaks.
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

@@ -137,8 +137,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package `symbolic` also prints the version of the Python interpreter that it uses.
-    # `re.sub` removes this version.
+    # Octave's package `symbolic` also prints a version of Python, which `re.sub` removes.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 

@@ -53,7 +53,7 @@ def check_pair(name: str, change: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": change, "verdict": comparison.verdict.value, "seconds": seconds}
     if change in ALIKE:
         return result | {"right": bool(comparison) and moves_alike(comparison, a, b, ROUNDING)}
-    # Rounding to four digits leaves some files unchanged. Every verdict is then accepted.
+    # Rounding to four digits leaves some files unchanged, so every verdict is accepted.
     result["right"] = comparison.verdict is Verdict.DIFFERS or change == "rounded"
     tools = {tool.b for tool in comparison.tools}
     frames = [frame for frame in comparison.frames if frame.frame_b not in tools and frame.q_a]

@@ -229,7 +229,7 @@ def breadth_first_joints(urdf: str) -> list[str]:
     ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
     links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
     names = []
-    for link in links:  # The loop appends to this list.
+    for link in links:  # The loop appends the child links to `links`.
         for joint, (parent, child) in zip(joints, ends, strict=True):
             if parent == link:
                 links.append(child)

@@ -219,7 +219,7 @@ def _placements_by_name(
         except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
             if prefixed_names[i] in names:
                 raise
-        except InputError:  # Two frames have this name.
+        except InputError:  # A link and a joint have the same name.
             if prefixed_names[i] not in links & joints:
                 raise
 

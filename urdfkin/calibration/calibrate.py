@@ -540,7 +540,7 @@ def _verify_written(calibration: Calibration, measurements: Measurements, q: Arr
     parameter_values = fitted.parameter_values.copy()
     parameter_values[[p.is_base_or_tool or p.name == "gain" for p in calibration.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # The first `load` gave these warnings.
+        warnings.simplefilter("ignore")  # The first `load` has already given the warnings.
         if (table := calibration.table) is not None:
             robot = load(table)
             robot.placement(robot.neutral(), robot.tip_frame)

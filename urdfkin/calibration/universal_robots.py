@@ -3,8 +3,8 @@
 The controller stores Denavit-Hartenberg parameters. The angle between two nominally parallel axes of the arm
 is about a milliradian, so their common normal is far away. The parameters d of consecutive rows can therefore
 be hundreds of metres, and cancel each other. The driver's program `ur_calibration` shifts the link frames
-along their axes, so that these large offsets disappear. The program writes the pose of each joint in the
-frame of the previous joint: x, y, z, roll, pitch and yaw.
+along their axes, so that all offsets become small. The program writes the pose of each joint in the frame of
+the previous joint: x, y, z, roll, pitch and yaw.
 
 The order of the rotations is ambiguous:
 
