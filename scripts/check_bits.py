@@ -42,7 +42,7 @@ from urdfkin.verify.verifier import compute_bound
 
 #: Sizes of batches. A kernel computes configurations in blocks of eight.
 LENGTHS = (1, 2, 7, 8, 9, 100)
-#: Numbers of threads of a batch; None: urdfkin's default.
+#: Numbers of threads of a batch. None means urdfkin's default.
 THREADS = (None, 1, 2, 3)
 #: Maximum numbers of stored configurations and frames for each robot.
 STORED, STORED_FRAMES = 9, 6

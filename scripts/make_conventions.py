@@ -120,7 +120,7 @@ Row = tuple[str, str, str, str]
 
 
 class MeasuredMotion:
-    """A motion, computed by libraries and by difference quotients."""
+    """A motion that libraries compute, and that difference quotients compute independently."""
 
     def __init__(self, seed: int = 0) -> None:
         rng = np.random.default_rng(seed)

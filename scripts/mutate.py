@@ -135,7 +135,7 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Read docs/mutation.md: {(function, change): reason}."""
+    """Read the reasons for harmless mutants, by function and change, from docs/mutation.md."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)

@@ -49,9 +49,9 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    reads: str  # The tool that writes the input file. Empty: the input file is the URDF.
+    reads: str  # The tool that writes the input file; empty if the URDF is the input file.
     program: str  # Python code that converts the file `source`.
-    writes: str = ""  # End of the output file's path. Empty: the program prints the path.
+    writes: str = ""  # End of the output file's path; empty if the program prints the path.
 
 
 TOOLS = {

@@ -34,7 +34,7 @@ class TimedTask:
     n: int
     compute: Callable[[], object]
     #: Function that returns the results in urdfkin's conventions.
-    #: None: the results are not compared.
+    #: Without this function, the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
     remark: str = ""
@@ -190,7 +190,7 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield (q, v, a); with one input, (q, q, q)."""
+    """Yield (q, v, a) for each configuration. If the only input is q, yield (q, q, q)."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 

@@ -159,7 +159,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """(p,) changes of all parameters by `written_fit`, m and rad. The file can store only some."""
+        """(p,) changes of all parameters by `written_fit`, m and rad. The file stores the `writable` ones."""
         return self._parameter_changes(self.written_fit)
 
     @cached_property
@@ -249,23 +249,23 @@ def calibrate(
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
-        q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
-            could be identified.
+        q: (s, nq) configurations, rad and m; for a table (s, coordinates). Without q and poses, the result
+            only states which parameters could be identified.
         poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m. If `fit` contains
             "base", the poses are in the instrument's frame. If `fit` contains "tool", the poses are those of
             the target.
-        tip: Name of a link or joint; the robot's tip when None. None for a table.
-        base: Name of a link or joint; the robot's base frame when None. None for a table.
+        tip: Name of a link or joint (default: the robot's tip). Must be None for a table.
+        base: Name of a link or joint (default: the robot's base frame). Must be None for a table.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "gains":
             the scale factors of the joint values. "origins": six numbers of each joint origin. For a table,
             "origins" means the cells of the table. A row has the cell beta only if the next axis is nearly
             parallel or beta is not 0.
         noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
-            an axis (rad). None: the noise is estimated from the residuals.
+            an axis (rad). By default, the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
-        full_poses: Whether you will measure full poses, not only positions. Without effect if `poses` is
-            given.
+        full_poses: Whether you will measure full poses, not only positions. The argument has no effect if
+            `poses` is given.
         radians: True if joint angles of more than one turn are in radians.
         force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
             Joint values that look like degrees are refused even with `force`. Convert degrees to radians, or

@@ -152,7 +152,7 @@ def identify(
         model: The model.
         joint_values: (s, n) joint values.
         full_poses: Whether full poses are measured.
-        parameter_values: (p,) parameter values; those of the original model when None.
+        parameter_values: (p,) parameter values (default: the values of the original model).
     """
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))

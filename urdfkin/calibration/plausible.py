@@ -405,5 +405,5 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm (m) of the residuals; the rotation residuals (rad) are multiplied by the reach (m)."""
+    """Return the norm (m) of the residuals. Rotation residuals (rad) are multiplied by the reach (m)."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))
