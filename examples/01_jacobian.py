@@ -1,4 +1,4 @@
-"""Compute the Jacobian at a pose that names joints and their values, and interpret one of its columns.
+"""Compute the Jacobian at a pose that names joints and their values, and interpret a column of the Jacobian.
 
 You learn how to name joints, which units apply, how rows and columns are ordered, and how results are
 checked.
@@ -9,7 +9,7 @@ import numpy as np
 import urdfkin
 
 robot = urdfkin.load("panda")  # The argument is a name, a path, or URDF text.
-# The text describes a configuration: all joints have their values in the pose `neutral`, except three joints.
+# The text describes a configuration: three joints have the given values, and the others those of `neutral`.
 # An angle without a unit is in radians; `-30deg` is in degrees; `-2*pi/3` is a multiple of pi.
 # Instead of a text, you can pass a mapping from joint names to values.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"

@@ -9,8 +9,8 @@ import urdfkin
 robot = urdfkin.load("ur10")
 q = robot.sample(2000, seed=1)
 
-robot.jacobian(q, robot.tip_frame)  # By default, Pinocchio also computes these 2,000 Jacobians.
-robot.placement(q, robot.tip_frame, verify="sample")  # Pinocchio checks 100 of the 2,000.
+robot.jacobian(q, robot.tip_frame)  # By default, Pinocchio checks all 2,000 Jacobians.
+robot.placement(q, robot.tip_frame, verify="sample")  # Pinocchio checks 100 of the 2,000 placements.
 robot.velocity(q, q, robot.tip_frame, verify=False)  # The certificate counts unchecked results.
 
 certificate = robot.certificate()

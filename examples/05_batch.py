@@ -13,7 +13,7 @@ import urdfkin
 robot = urdfkin.load("panda")
 q = robot.sample(100_000, seed=0)  # (100000, 8)
 J = np.empty((len(q), 6, robot.nv))
-robot.jacobian(q[:1], "panda_hand", verify=False)  # This call compiles the kernel.
+robot.jacobian(q[:1], "panda_hand", verify=False)  # The first call compiles the kernel.
 
 start = time.perf_counter()
 robot.jacobian(q, "panda_hand", out=J, verify="sample")

@@ -1,4 +1,4 @@
-"""Compute one velocity in three reference frames, and convert between them.
+"""Compute one velocity in three reference frames, and convert it from one reference frame to another.
 
 You learn that LOCAL, WORLD and LOCAL_WORLD_ALIGNED have the same meaning as in Pinocchio.
 """
@@ -14,7 +14,7 @@ for reference in urdfkin.Reference:
     print(f"{reference.name:<20} {robot.velocity(q, v, 'tool0', reference)}")
 
 # The velocity in LOCAL is expressed in the tool's axes.
-# The tool's rotation matrix converts this velocity to LOCAL_WORLD_ALIGNED.
+# The tool's rotation matrix converts the velocity from LOCAL to LOCAL_WORLD_ALIGNED.
 R_world_tool = robot.placement(q, "tool0")[:3, :3]
 local = robot.velocity(q, v, "tool0", "local")
 aligned = robot.velocity(q, v, "tool0")  # the default frame

@@ -19,7 +19,8 @@ assert np.allclose(acceleration[:3], [-x, -y, 0.0])  # w x (w x d), 7.130
 
 # The pose of a floating base is part of q, and its velocity is part of v.
 free = urdfkin.load("ur5", root_joint="floating")
-q_free = np.concatenate([[0, 0, 0, 0, 0, 0, 1.0], q])  # The order is x y z, quaternion x y z w, joints.
+# A configuration begins with the position x, y, z and the quaternion x, y, z, w of the base.
+q_free = np.concatenate([[0, 0, 0, 0, 0, 0, 1.0], q])
 v_free = np.concatenate([[0, 0, 0, 0, 0, 1.0], v])
 print("as a floating base:", free.velocity(q_free, v_free, "tool0").round(6))
 print(free.certificate())

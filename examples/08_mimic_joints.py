@@ -19,5 +19,5 @@ left, right = (robot.placement(q, f"panda_{side}finger")[:3, 3] for side in ("le
 print(f"gap between the fingers: {1e3 * np.linalg.norm(left - right):.1f} mm")
 
 J = robot.jacobian(q, "panda_rightfinger")
-print("the mimic joint's motion in the mimicked joint's column:", J[:3, -1].round(3))
+print("Jacobian column of the mimicked joint, for the frame of the mimic joint:", J[:3, -1].round(3))
 assert np.linalg.norm(J[:3, -1]) > 0.99

@@ -1,8 +1,8 @@
 """Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
 You learn that the table and the URDF may have different base frames, tool frames and zero positions of the
-joints. The function `compare` removes these differences by a fit. Then `compare` computes the largest
-distance between the table's tip and the URDF's tip, and lists the cells of the table that differ.
+joints. The function `compare` first fits the two frames and the zero positions. Then `compare` computes the
+largest distance between the table's tip and the URDF's tip, and lists the cells of the table that differ.
 """
 
 from dataclasses import replace

@@ -105,7 +105,7 @@ class Page:
     ready: str = ""
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
-    whole: bool = True  # False: check only screens, not keyboard, HTML and PDF
+    whole: bool = True  # whether keyboard, HTML and PDF are checked, not only screens
 
 
 def read_axe_script() -> str | None:

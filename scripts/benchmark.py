@@ -1,4 +1,4 @@
-"""Compare the speed of urdfkin, Pinocchio and other libraries at the same work, in one process.
+"""Compare the speed of urdfkin, Pinocchio and other libraries for the same computations, in one process.
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # Import urdfkin and `scripts` from this checkout.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # Idle threads of PyTorch slow other libraries.
+# Without this setting, idle threads of PyTorch make other libraries slower.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from scripts.benchmarking import sections as measured
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
@@ -116,7 +117,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # at exit, this library prints warnings about memory leaks
+    if "roboticstoolbox" in sys.modules:  # At exit, the toolbox would print warnings about memory leaks.
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

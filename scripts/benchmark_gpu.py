@@ -8,9 +8,9 @@ median of several launches. A data rate counts the bytes that a program reads an
 column is the data rate of the code, divided by the data rate of a copy within the GPU's memory.
 
 If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
-`torch.compile`. If PyTorch Kinematics is installed too, the program also measures this library's Jacobian.
-Before the time measurements, the program checks results of two contenders: the exported code without
-`torch.compile`, and PyTorch Kinematics.
+`torch.compile`. If PyTorch Kinematics is installed too, the program also measures the Jacobian of PyTorch
+Kinematics. Before the time measurements, the program checks results of two contenders: the exported code
+without `torch.compile`, and PyTorch Kinematics.
 
 The program needs nvcc, which `make nvcc` installs into the checkout's environment.
 

@@ -53,11 +53,8 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
     except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
-    # git prints an entry for each changed file:
-    # added lines TAB deleted lines TAB path NUL.
-    # git's entry for a moved file:
-    # added lines TAB deleted lines TAB
-    # NUL old path NUL new path NUL.
+    # git separates the numbers of added and deleted lines and the path with TAB, and ends an entry with NUL.
+    # The entry of a moved file contains NUL, the old path, NUL and the new path instead of the path.
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))

@@ -42,7 +42,7 @@ from urdfkin.verify.verifier import compute_bound
 
 #: Sizes of batches. A kernel computes configurations in blocks of eight.
 LENGTHS = (1, 2, 7, 8, 9, 100)
-#: Numbers of threads of a batch; None: urdfkin's default.
+#: Numbers of threads of a batch. None means urdfkin's default.
 THREADS = (None, 1, 2, 3)
 #: Maximum numbers of stored configurations and frames for each robot.
 STORED, STORED_FRAMES = 9, 6
@@ -160,7 +160,7 @@ def digest(now: Arrays) -> str:
 
 
 def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference as a fraction of the bound."""
+    """Return the largest difference from the stored results, divided by the stored error bound."""
     if have_equal_bits(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])

@@ -52,9 +52,8 @@ _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
 #: For robots with more joint velocities, the formats `torch` and `jax` are checked without Hessian.
-#: The check of a larger Hessian is slow.
-#: For JAX, the format `array` is checked without Hessian.
-#: JAX would compile this Hessian for minutes.
+#: The check of the Hessian would be slow.
+#: For JAX, the format `array` is always checked without Hessian, because JAX would compile it for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 

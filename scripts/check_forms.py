@@ -77,8 +77,8 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: Function of jobs and a folder; returns one array of poses for each job.
-#: The function may write files into the folder.
+#: A function that runs the code of jobs, and returns one array of poses for each job.
+#: The function may write files into the given folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -137,8 +137,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package `symbolic` also prints the version of the Python interpreter that it uses.
-    # `re.sub` removes this version.
+    # Octave's package `symbolic` also prints a version of Python, which `re.sub` removes.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -175,7 +174,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return max(0, table width - text width) of each table, in points."""
+    """Return the width (points) by which each table is wider than the text; 0 if the table fits."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -221,8 +220,7 @@ class Case:
             Largest difference from urdfkin's pose, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Sine and cosine have rounding errors.
-        # The bound is therefore not zero, even if all lengths are zero.
+        # Even if all lengths are zero, sine and cosine have rounding errors, so `allowed` must not be zero.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

@@ -8,9 +8,9 @@ a check that takes longer than `--patience`, the script skips the larger documen
 content.
 
 For each kind of content, a function returns a URDF that repeats this content. The URDF has approximately the
-size (bytes) that the script passes to the function. A faulty exporter or an attacker could write such files.
-urdfkin rejects most of these files. Even then, the time and memory of the check must be proportional to the
-size of the file.
+size (bytes) that the script passes to the function. Files from a faulty exporter or an attacker may have as
+many repetitions. Even if urdfkin rejects the file, the time and memory of the check must be proportional to
+the file's size.
 """
 
 import argparse

@@ -9,10 +9,10 @@ predict the poses of matched links in the copy. The script tests the predicted p
 For the other ten changes, `same` must find that robot and copy differ. The change `rounded` is an exception:
 rounding to four digits leaves some robots unchanged, so every verdict is accepted.
 
-After these ten changes, the script also checks the interval of `same` for the largest distance between a
-frame of the robot and the corresponding frame of the copy. The script skips an infinite interval, and a copy
-whose base `same` moves. An independent global search maximizes the distance. The script computes the distance
-with fifty digits from the decimal numbers in the two URDF texts. The distance must lie in the interval.
+For these ten changes, `same` also returns an interval for the largest distance between matching frames of
+robot and copy. The script checks this interval. An independent global search maximizes the distance. The
+script computes the distance with fifty digits from the decimal numbers in the two URDF texts. The distance
+must lie in the interval. The script skips an infinite interval, and a copy whose base `same` moves.
 
 Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
@@ -53,7 +53,7 @@ def check_pair(name: str, change: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": change, "verdict": comparison.verdict.value, "seconds": seconds}
     if change in ALIKE:
         return result | {"right": bool(comparison) and moves_alike(comparison, a, b, ROUNDING)}
-    # Rounding to four digits leaves some files unchanged. Every verdict is then accepted.
+    # Rounding to four digits leaves some files unchanged, so every verdict is accepted.
     result["right"] = comparison.verdict is Verdict.DIFFERS or change == "rounded"
     tools = {tool.b for tool in comparison.tools}
     frames = [frame for frame in comparison.frames if frame.frame_b not in tools and frame.q_a]

@@ -20,8 +20,8 @@ from urdfkin.cli import cli
 LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: For each page: title, introduction, and the names that the page describes.
-#: A name without a dot is in `urdfkin` or `Robot`.
+#: Maps a page to its title, its introduction, and the names that the page describes.
+#: A name without a dot is a name in the package `urdfkin` or in the class `Robot`.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",

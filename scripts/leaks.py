@@ -50,7 +50,7 @@ def measure_usage() -> dict[str, float]:
 def measure(n: int) -> list[dict[str, float]]:
     # `use_only` loads each kernel at its first use.
     # Without `use_only`, urdfkin would load some kernels only after many calls.
-    # The memory of these kernels would look like a leak.
+    # The growth of memory after these calls would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

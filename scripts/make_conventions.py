@@ -1,8 +1,8 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
 For most rows, the script computes a result of each library for a random motion of a given robot. The script
-also computes the quantity by several definitions, and writes the only definition that agrees with the result.
-A test checks that the page is current.
+also computes the quantity by several definitions. Exactly one definition must agree with the library's
+result, and the page shows this definition. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
 first runs each installed library on all robots of the catalogue. Each library uses its own convention. The
@@ -120,7 +120,7 @@ Row = tuple[str, str, str, str]
 
 
 class MeasuredMotion:
-    """A motion, computed by libraries and by difference quotients."""
+    """A motion that libraries compute, and that difference quotients compute independently."""
 
     def __init__(self, seed: int = 0) -> None:
         rng = np.random.default_rng(seed)

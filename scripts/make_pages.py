@@ -236,8 +236,8 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # `steps`: largest width of an interval, divided by the distance between neighbouring doubles.
-            # The distance is `np.spacing` of the quantity's largest absolute value.
+            # `steps` is the largest width of an interval, as a multiple of the distance between doubles.
+            # The distance is that of neighbouring doubles at the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

@@ -22,8 +22,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
     """Return the sizes (bytes) of a package and its dependencies.
 
-    The result omits the package `without`. The dependencies of `without` are also omitted, unless another
-    package requires them.
+    The result omits the package `without`, and packages that only `without` requires.
     """
     sizes: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()

@@ -34,7 +34,7 @@ class Row:
     name: str  # label of the row on the page
     arguments: tuple[str, ...]  # arguments of `python`; the path of a URDF file replaces ROBOT
     max_ratio: float = math.inf  # time limit, divided by the time of `import numpy, pinocchio`
-    empty_cache: bool = False  # True: the process finds no compiled kernels on disk.
+    empty_cache: bool = False  # Whether the process starts without compiled kernels on disk.
 
 
 _JACOBIAN = ("-c", _COMMAND, "jacobian", "ROBOT", "--q", "random")

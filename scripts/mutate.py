@@ -106,7 +106,7 @@ def find_near_tests(path: Path) -> list[str]:
 class NamedMutant:
     claim: str  # the mistake that must be detected
     #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`.
-    #: If the code is outside functions, the full name of the module.
+    #: For code outside functions, this is the full name of the module.
     function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`
@@ -135,7 +135,7 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Read docs/mutation.md: {(function, change): reason}."""
+    """Read the reasons for harmless mutants, by function and change, from docs/mutation.md."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)

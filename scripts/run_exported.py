@@ -7,8 +7,9 @@ The interpreter does not need urdfkin.
 
 The first argument names the library, `torch` or `jax`. The script calls `check`, a function in each file.
 Files of the format `array` use this library. If a file contains a Hessian, the script differentiates the
-file's Jacobian with the library. The result must agree with the true Hessian in the file, within the file's
-error bounds. For the first file of PyTorch code, `torch.compile` compiles all functions except `hessian`.
+file's Jacobian with the library. The derivative must agree with the expected Hessian that the file contains,
+within the file's error bounds. For the first file of PyTorch code, `torch.compile` compiles all functions
+except `hessian`.
 `scripts/check_exports.py --library` calls this script.
 """
 

@@ -10,11 +10,11 @@ usd-exchange contain modules with equal names:
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
 
-The script prints a table with one row for each robot. If the user names one tool, a row shows the verdict of
-`same`, and bounds on the distance and on the angle between matching frames. If the user names several tools,
-a row has one cell for each tool, with a short verdict and the bound on the distance. The full verdicts are
-printed to standard error. For several tools, `same` uses no branch and bound. Without branch and bound,
-`same` is faster, but the bounds may be larger.
+The script prints a table with one row for each robot. For one tool, a row shows the verdict of `same`. The
+row also shows a bound on the distance and a bound on the angle between matching frames. For several tools, a
+row has one cell for each tool. The cell shows a short verdict and the bound on the distance. The full
+verdicts are printed to standard error. For several tools, `same` uses no branch and bound. Without branch and
+bound, `same` is faster, but the bounds may be larger.
 
 The script removes visuals and collisions, because a converter would search for the meshes. MuJoCo refuses a
 moving body without mass. The script therefore sets options of MuJoCo. The options give bodies without mass a
@@ -49,9 +49,9 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    reads: str  # The tool that writes the input file. Empty: the input file is the URDF.
+    reads: str  # The tool that writes the input file; empty if the URDF is the input file.
     program: str  # Python code that converts the file `source`.
-    writes: str = ""  # End of the output file's path. Empty: the program prints the path.
+    writes: str = ""  # End of the output file's path; empty if the program prints the path.
 
 
 TOOLS = {
@@ -90,7 +90,7 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Beginning of a verdict, and the word that replaces the verdict.
+#: Short forms of verdicts. A verdict that begins with a key is replaced by the value.
 #: For example, "single precision" replaces "same up to single precision".
 #: The first matching key counts.
 _SHORT = {

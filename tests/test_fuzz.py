@@ -100,8 +100,8 @@ LARGE = arm(follow='<mimic joint="j1" multiplier="1e300"/>', more=_END)
     [
         (arm(), "verified"),
         (arm(axis='<axis xyz="0 0 0"/>'), "refused"),
-        (arm(origin='<origin xyz="0\t0 1"/>'), "not verified, with a finding that states the reason"),
-        (LARGE, "too large to compute, with a finding that states the reason"),
+        (arm(origin='<origin xyz="0\t0 1"/>'), "not verified; a finding states the reason"),
+        (LARGE, "too large to compute; a finding states the reason"),
     ],
 )
 def test_the_outcome_of_a_robot_is_reported(text: str, word: str) -> None:

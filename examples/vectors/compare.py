@@ -5,8 +5,8 @@ from compare import wrong
 for line in wrong("vectors/mimic.json", answer):
     print(line)
 
-You write the function `answer(quantity, frame, reference, q, v, a)`. It returns nested lists or an array, or
-None for a quantity that you do not compute.
+You write the function `answer(quantity, frame, reference, q, v, a)`. The function returns nested lists or an
+array. For a quantity that you do not compute, the function returns None.
 """
 
 import json

@@ -38,7 +38,7 @@ class Contender:
     module: str
     calls: Callable[[Workload, str], Iterator[Calls]] | None = None
     #: Function that yields the timed tasks for batches.
-    #: If None, the benchmark calls the library once for each configuration.
+    #: Without this function, the benchmark calls the library once for each configuration.
     batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 
@@ -229,7 +229,7 @@ def breadth_first_joints(urdf: str) -> list[str]:
     ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
     links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
     names = []
-    for link in links:  # The loop appends to this list.
+    for link in links:  # The loop appends the child links to `links`.
         for joint, (parent, child) in zip(joints, ends, strict=True):
             if parent == link:
                 links.append(child)

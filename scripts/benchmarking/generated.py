@@ -1,14 +1,14 @@
 """Generate C code for one robot, one frame and one quantity.
 
-The benchmark compares the speed of urdfkin's kernels, which compute any robot, with the speed of this code.
+The benchmark compares the speed of this code with the speed of urdfkin's kernels, which work for all robots.
 CasADi writes the textbook's equations as C code without loops and branches. The code contains the robot's
 constants, and omits products with 0 and 1. The code computes several configurations together, with SIMD
-vectors of doubles; `generated.c` contains the loop over the configurations. The time includes sine, cosine
-and the transposition of the arrays.
+vectors of doubles; `generated.c` contains the loop over the configurations. The measured time includes sine,
+cosine and the transposition of the arrays.
 
-The generated code does not check inputs. Its results are wrong if an input is not finite, or if an angle
-has 10^15 turns or more. On processors without fused multiply-adds, a million turns cause errors of 1e-9 in
-sine and cosine. The generated code computes sine and cosine without urdfkin's correction of the last digit.
+The generated code does not check inputs. Infinite inputs, nan, and angles of 10^15 turns or more cause wrong
+results. On processors without fused multiply-adds, a million turns cause errors of 1e-9 in sine and cosine.
+The generated code computes sine and cosine without urdfkin's correction of the last digit.
 """
 
 import ctypes
@@ -90,7 +90,7 @@ def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
     """Compile the C code.
 
     Returns:
-        Function of the batch size and the addresses of q, v, a, `out`.
+        The compiled function. Its arguments are the batch size and the addresses of q, v, a and `out`.
     """
     plan, folder = workload.plan, workload.folder
     is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE

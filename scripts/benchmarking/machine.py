@@ -21,13 +21,12 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Names of two times (ms) until a process has its first result.
+#: Keys of the time (ms) that a process needs for its first result.
 #: `EMPTY`: the kernel cache is empty.
 #: `STORED`: the kernel cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` whose first call compiles a kernel.
-#: Each method has a number of inputs:
-#: 1: q; 2: q and v; 3: q, v and a.
+#: Methods of `Robot` that compile a kernel at their first call, with the number of inputs.
+#: The inputs are 1: q, 2: q and v, 3: q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -106,7 +105,7 @@ def _measure_peak(robot: str, frame: str, quantity: str, count: str, kind: str) 
         with use_only("compiled"):
             # This call loads compiled code and starts threads.
             method(*warm_up_inputs, frame, verify=False, threads=2)
-        Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM, the maximum of VmRSS.
+        Path("/proc/self/clear_refs").write_text("5")  # The 5 resets VmHWM, the maximum of VmRSS.
         before = _read_bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         peak = _read_bytes("VmHWM") - before + (out.nbytes if out is not None else 0)

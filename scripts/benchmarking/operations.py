@@ -37,7 +37,7 @@ class Number:
 
     Attributes:
         constant: 0 or 1; None for any other number.
-        operands: Two operands; empty for an input or a constant.
+        operands: The two operands of the recorded operation. An input or a constant has no operands.
     """
 
     constant: int | None = None

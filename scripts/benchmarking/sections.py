@@ -109,7 +109,7 @@ def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) ->
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
     """Measure chains with the given numbers of joints.
 
-    Configurations of a batch: numbers / (6 * joints), but at least 16.
+    A batch of Jacobians has about `numbers` elements, and at least 16 configurations.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)
@@ -161,7 +161,7 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 # Only the seventh line, a call of the robot's method, contains all steps.
 # The time of a step follows from differences between the times of the lines.
 
-#: Instructions for each step of a batch, in the order of the steps.
+#: The steps of a batch, each with the instructions of the compiled program that the step executes.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -209,7 +209,8 @@ def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram,
         program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, buffered=buffered
     )
     core = getattr(kernels, f"{quantity}s")
-    owners = program, memory, out, inputs  # The kernel arguments contain the addresses of these arrays.
+    # The kernel arguments contain addresses of arrays, so the arrays must exist until the last call.
+    owners = program, memory, out, inputs
 
     def compute(_: object = owners) -> None:
         core(kernel_args.ctypes.data)

@@ -18,7 +18,7 @@ _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 #: Sections with measurements for several numbers of joints, frames or configurations.
-#: Each value contains the title of the section's table, and a function that returns the cells of a row.
+#: A section has a title, and a function that makes the table row of one measurement.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",

@@ -34,7 +34,7 @@ class TimedTask:
     n: int
     compute: Callable[[], object]
     #: Function that returns the results in urdfkin's conventions.
-    #: None: the results are not compared.
+    #: Without this function, the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
     remark: str = ""
@@ -46,7 +46,7 @@ class Row:
 
     Attributes:
         numbers: Number of values in one result.
-        size: Number of joints, frames or configurations.
+        size: Number of joints, frames or configurations, in a section that varies this number. Otherwise 0.
         n: Number of configurations in a call.
     """
 
@@ -146,13 +146,13 @@ class Calls:
     #: The value of the last line is the result.
     lines: tuple[str, ...]
     #: Lines that write the result of configuration k into `out[k]`.
-    #: None: the value of the last line in `lines` is written into `out[k]`.
+    #: If `store` is None, the benchmark writes the value of the last line in `lines` into `out[k]`.
     store: tuple[str, ...] | None = None
     #: `order[i]` is urdfkin's index of the library's coordinate i.
-    #: None: the library and urdfkin have the same order of coordinates.
+    #: If `order` is None, the library and urdfkin have the same order of coordinates.
     order: list[int] | None = None
     #: Shape of the library's result for one configuration.
-    #: None: the shape of urdfkin's result.
+    #: If `shape` is None, the result has the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
     #: Function that converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
@@ -190,7 +190,7 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield (q, v, a); with one input, (q, q, q)."""
+    """Yield (q, v, a) for each configuration. If the only input is q, yield (q, q, q)."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 

@@ -1,1 +1,1 @@
-"""Programs that run Denavit-Hartenberg tables, which were exported as code."""
+"""Programs that run the exported code of Denavit-Hartenberg tables."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 PASSED = (
     "refused",
     "verified",
-    "not verified, with a finding that states the reason",
-    "too large to compute, with a finding that states the reason",
+    "not verified; a finding states the reason",
+    "too large to compute; a finding states the reason",
 )
 
 
@@ -28,7 +28,7 @@ class Outcome:
     """The outcome of a test.
 
     Attributes:
-        result: An element of `PASSED`, or a failure, for example "disagrees with Pinocchio".
+        result: Short description. The test failed if the description is not in `PASSED`.
     """
 
     result: str

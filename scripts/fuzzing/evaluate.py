@@ -26,19 +26,17 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Codes of findings about huge numbers.
-#: With these findings, results may be inf or nan.
+#: Codes of findings about huge numbers, for which results may be inf or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of links and joints whose frames one call computes.
 FRAMES_PER_CALL = 12
-#: Calls for several frames are compared with calls for single frames.
-#: Maximum number of calls for single frames.
+#: Maximum number of calls for single frames, which are compared with calls for several frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Standard deviation of each coordinate of the far base's position, in metres.
 FAR = 1e6
-#: Quantities that one call computes for several frames.
-#: The value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
+#: Quantities that one call computes for several frames, with the number of inputs.
+#: The inputs are 1: q, 2: q and v, 3: q, v and a.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -87,7 +85,7 @@ def _evaluate_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome
 def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
     too_large = "a result is not a finite number"
     if _SIZES & {finding.code for finding in findings}:
-        too_large = "too large to compute, with a finding that states the reason"
+        too_large = "too large to compute; a finding states the reason"
     try:
         for computation, result in compute_all(robot, seed=0):
             if not np.isfinite(result).all():
@@ -108,11 +106,11 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
         return Outcome("verified")
     for finding in findings:
         if finding.pinocchio_reading is not None:
-            return Outcome("not verified, with a finding that states the reason", finding.code)
+            return Outcome("not verified; a finding states the reason", finding.code)
     if (reason := robot.verifier.find_refusal()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
     texts = "; ".join(str(w.message) for w in warned)
-    return Outcome("not verified, and no finding states the reason", texts)
+    return Outcome("not verified; no finding states the reason", texts)
 
 
 def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
@@ -221,7 +219,7 @@ def _placements_by_name(
         except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
             if prefixed_names[i] in names:
                 raise
-        except InputError:  # Two frames have this name.
+        except InputError:  # A link and a joint have the same name.
             if prefixed_names[i] not in links & joints:
                 raise
 

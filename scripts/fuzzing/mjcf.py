@@ -76,7 +76,8 @@ class _RandomModel:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        for _ in range(rng.randint(1, 2)):  # For a rotated box, the axes of inertia are oblique.
+        # The axes of inertia of a rotated box are not parallel to the body's axes.
+        for _ in range(rng.randint(1, 2)):
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
         if rng.random() < 0.2:

@@ -70,7 +70,7 @@ def usual_length(rng: random.Random) -> float:
 def odd_length(rng: random.Random) -> float:
     """Return a length of random magnitude and sign.
 
-    The magnitude is below 1e301, so a sum of several lengths does not overflow.
+    Each length is below 1e301, so a sum of several lengths does not overflow.
     """
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])

@@ -125,6 +125,15 @@ def table(convention: DHConvention) -> DHTable:
     return DHTable(convention, rows, base=T, tool=inverse(T))
 
 
+@pytest.mark.parametrize("name", ["base", "tool"])
+def test_parameters_of_base_and_tool_are_grouped_even_if_a_joint_has_their_name(name: str) -> None:
+    dh = table(DHConvention.STANDARD)
+    dh = replace(dh, rows=(replace(dh.rows[0], joint=name), *dh.rows[1:]))
+    model = make_table_model(dh, ("base", "tool", "origins"))
+    grouped = sorted(k for group in model.parameter_groups for k in group)
+    assert grouped == list(range(len(model.chain.parameters)))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", list(DHConvention))
 def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fifty_digits(

@@ -185,6 +185,19 @@ def test_values_beyond_a_turn_are_refused_as_degrees_unless_declared_as_radians(
     assert not found.plausibility.objections
 
 
+@pytest.mark.parametrize("name", ["three", "tool"])
+def test_a_tilted_axis_is_reported_even_if_the_joint_is_named_like_the_tool(name: str) -> None:
+    text = BRANCHED.replace('"three"', f'"{name}"')
+    true = urdfkin.load(text.replace('xyz="0.48 0.6 0.64"', 'xyz="0.6 0.48 -0.64"'))
+    q = true.sample(60, seed=1)
+    T = true.placement(q, "hand")
+    p = T[:, :3, 3] + T[:, :3, :3] @ [0.05, 0.02, 0.1]
+    found = calibrate(urdfkin.load(text), q, p, tip="hand", fit=["tool", "origins"], force=True)
+    assert any(
+        f"tilts the axis of joint {name!r}" in objection for objection in found.plausibility.objections
+    )
+
+
 def test_a_refused_fit_is_returned_with_force() -> None:
     found = fitted("ur5", np.roll(arm("ur5").q, 1, axis=0), force=True)
     assert found.plausibility.objections

@@ -1,8 +1,8 @@
 """Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
 
 A fit that is not plausible (`plausible.py`) is refused. Without `write_all`, joint parameters that changed by
-at most two standard deviations get their original values. The other parameters are fitted again, and written
-if the file can store them. These include all identifiable parameters of base and tool.
+at most two standard deviations get their original values. The other parameters of joints and all identifiable
+parameters of base and tool are fitted again. Parameters that the file can store are then written.
 
 `read_poses` reads measured poses:
 
@@ -71,8 +71,8 @@ _MAX_UNCERTAINTY_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7).
-#: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
+#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7) in the tip's
+#: frame. L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
 _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
@@ -99,9 +99,9 @@ class Calibration:
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to u_measured / u_random. The
-            first is the uncertainty at the measured configurations. The second is the uncertainty at equally
-            many random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to a ratio of two uncertainties.
+            The uncertainty at the measured configurations is divided by the uncertainty at equally many
+            random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -159,7 +159,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """(p,) changes of all parameters by `written_fit`, m and rad. The file can store only some."""
+        """(p,) changes of all parameters by `written_fit`, m and rad. The file stores the `writable` ones."""
         return self._parameter_changes(self.written_fit)
 
     @cached_property
@@ -249,22 +249,23 @@ def calibrate(
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
-        q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
-            could be identified.
+        q: (s, nq) configurations, rad and m; for a table (s, coordinates). Without q and poses, the result
+            only states which parameters could be identified.
         poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m. If `fit` contains
-            "base", the poses are in the instrument's frame. If `fit` contains "tool", they are poses of the
-            target.
-        tip: Name of a link or joint; the robot's tip when None. None for a table.
-        base: Name of a link or joint; the robot's base frame when None. None for a table.
+            "base", the poses are in the instrument's frame. If `fit` contains "tool", the poses are those of
+            the target.
+        tip: Name of a link or joint (default: the robot's tip). Must be None for a table.
+        base: Name of a link or joint (default: the robot's base frame). Must be None for a table.
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
-            "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
-            six numbers of each joint origin, or the cells of a table. A table's row has the cell beta only if
-            the next axis is nearly parallel or beta is not 0. "gains": the scale factors of the joint values.
+            "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "gains":
+            the scale factors of the joint values. "origins": six numbers of each joint origin. For a table,
+            "origins" means the cells of the table. A row has the cell beta only if the next axis is nearly
+            parallel or beta is not 0.
         noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
-            an axis (rad). None: the noise is estimated from the residuals.
+            an axis (rad). By default, the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
-        full_poses: Whether you will measure full poses, not only positions. Without effect if `poses` is
-            given.
+        full_poses: Whether you will measure full poses, not only positions. The argument has no effect if
+            `poses` is given.
         radians: True if joint angles of more than one turn are in radians.
         force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
             Joint values that look like degrees are refused even with `force`. Convert degrees to radians, or
@@ -477,8 +478,8 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
 
-    The original geometry is often special, with fewer identifiable parameters. For example, the tip can lie
-    on the last joint's axis.
+    Fewer parameters may be identifiable at the original values. For example, the original tip may lie on the
+    last joint's axis.
     """
     again = identify(
         model,
@@ -539,7 +540,7 @@ def _verify_written(calibration: Calibration, measurements: Measurements, q: Arr
     parameter_values = fitted.parameter_values.copy()
     parameter_values[[p.is_base_or_tool or p.name == "gain" for p in calibration.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # The first `load` gave these warnings.
+        warnings.simplefilter("ignore")  # The first `load` has already given the warnings.
         if (table := calibration.table) is not None:
             robot = load(table)
             robot.placement(robot.neutral(), robot.tip_frame)
@@ -620,7 +621,8 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest accepted error of a rotation matrix or of a quaternion's length; numbers in files are rounded.
+#: Largest accepted error of a rotation matrix, or of the length of a quaternion.
+#: The tolerance is large, because numbers in files are rounded.
 _ROTATION_TOLERANCE = 1e-3
 _POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))

@@ -1,10 +1,10 @@
 """Identify and fit the parameters of a model from measured poses.
 
-**Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
-a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
-parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value, which takes
-rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
-lower bound, so no tolerance is needed.
+**Identifiability.** A change of parameters without effect on the measurements cannot be identified. The null
+space of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
+identifiable parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value. The
+bound takes rounding errors into account (Weyl's inequality). The rank is the number of singular values with
+a positive lower bound, so no tolerance is needed.
 
 Some changes of a joint's frame can be compensated by an opposite change of the next frame (Everett, Driels
 and Mooring, 1987):
@@ -31,7 +31,8 @@ and cancel each other.
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum:
 
-    J, r                weighted Jacobian, weighted residuals
+    J                   weighted Jacobian
+    r                   weighted residuals
     C = (J^T J)^-1      covariance of the parameters
     H = J C J^T         hat matrix
     1 - H_ii            redundancy of measurement i
@@ -88,13 +89,12 @@ from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A Jacobian column is a candidate for the next fitted parameter if
-#:     length of its remainder >= _PIVOT_FRACTION * length of the longest remainder.
+#: The remainder of a candidate column has at least this fraction of the length of the longest remainder.
 _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The text "same effect as ..." omits fitted parameters with at most this fraction of the effect.
+#: The text "same effect as ..." omits fitted parameters that contribute at most this fraction of the effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -152,7 +152,7 @@ def identify(
         model: The model.
         joint_values: (s, n) joint values.
         full_poses: Whether full poses are measured.
-        parameter_values: (p,) parameter values; those of the original model when None.
+        parameter_values: (p,) parameter values (default: the values of the original model).
     """
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))
@@ -216,8 +216,7 @@ def join_names(names: Iterable[str], limit: int) -> str:
 #: Therefore, 0.5 separates 0 from 1 in spite of rounding errors.
 _MIN_TOTAL_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
-#: For an eigenvalue of zero, the fit adapts completely to a measurement error along the eigenvector.
-#: The residuals do not show this error.
+#: A measurement error along an eigenvector with the eigenvalue zero does not change the residuals.
 _EIGENVALUE_CUTOFF = 1e-9
 #: Maximum number of estimates of the noise.
 _MAX_NOISE_ESTIMATES = 20
@@ -262,8 +261,8 @@ class Noise:
     """Standard deviations of the measurements.
 
     Attributes:
-        metres: For each position coordinate, m.
-        radians: For the rotation about each axis, rad.
+        metres: Standard deviation (m) of each position coordinate.
+        radians: Standard deviation (rad) of the rotation about each axis.
     """
 
     metres: float
@@ -282,8 +281,8 @@ class Fit:
         parameter_values: (p,) values of all parameters.
         residuals: (s, 6) or (s, 3) measured minus computed values, in the measurements' frame, m and rad.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in their units. Infinite if the redundancy is
-            0 and the noise is not stated.
+        covariance: (k, k) covariance of the fitted parameters, in their units. If the noise is not stated,
+            a fit without redundancy has an infinite covariance.
         redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         chi_squares: (s,) chi^2 statistic of each pose.
     """
@@ -337,7 +336,7 @@ def compute_residuals(
     """Return residuals along the axes of the measurements' frame.
 
     Returns:
-        (s, 3) for positions, or (s, 6) for poses, m and rad.
+        (s, 3) residuals (m) of positions, or (s, 6) residuals (m and rad) of poses.
     """
     return _residuals_of_poses(measurements, model.chain.poses(measurements.joint_values, parameter_values))
 
@@ -481,8 +480,8 @@ def select_significant(
 ) -> NDArray[np.bool_]:
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step sets the least significant change to 0, and updates correlated changes. `always_selected` marks
-    the parameters that are selected in any case. Unknown covariances are inf.
+    Each step sets the least significant change to 0, and estimates the other changes again under this
+    condition. `always_selected` marks the parameters that are always selected. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -522,7 +521,7 @@ _MAX_START_REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
 _TARGET_CONVERGENCE = 1e-9
 #: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
-#: If positions are in millimetres by mistake, this quotient is about 1000.
+#: The quotient is about 1000 if positions are in millimetres by mistake.
 _MAX_SPREAD_RATIO = 100.0
 
 

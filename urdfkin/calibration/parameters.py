@@ -1,9 +1,9 @@
-"""Model a path with a URDF's origins or a table's cells as parameters, and compute its Jacobian.
+"""Model a path by parameters, and compute the Jacobian of the tip's pose with respect to the parameters.
 
-A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint
-origin of a URDF and a row of a Denavit-Hartenberg table have this form. An elementary motion is a rotation
-by an angle or a translation by a length. The angle or length is a parameter or the value of a joint. A joint
-can have a gain g:
+The parameters are numbers of a URDF's joint origins, or cells of a Denavit-Hartenberg table. A model is a
+path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint origin and a row
+of a table have this form. An elementary motion is a rotation by an angle or a translation by a length. The
+angle or length is a parameter or the value of a joint. A joint can have a gain g:
 
     q              value of the joint
     (1 + g) q      angle or length of the joint's motion
@@ -11,8 +11,8 @@ can have a gain g:
     q D            derivative of the tip's pose by g
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip also has six parameters. Other fixed joints have no parameters. On a path from parent
-to child, their parameters would have the same effect as those of a later joint.
+directly before the tip has the same six parameters. Other fixed joints have no parameters. On a path from
+parent to child, the parameters of a fixed joint would have the same effect as those of a later joint.
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis
@@ -25,9 +25,9 @@ robot's base in the instrument's frame. The path ends with the motions of `tool`
 the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
-`PARALLEL_TOLERANCE`, the row also has beta, Hayati's fifth parameter. A row with a nonzero beta always has
-this parameter. In a row with parallel axes, d has the same effect as parameters of other rows. A tilt of the
-axis in any direction needs both alpha and beta.
+`PARALLEL_TOLERANCE`, the row also has Hayati's fifth parameter beta. If beta is not 0 in the original table,
+beta is always a parameter. In a row with parallel axes, d has the same effect as parameters of other rows. A
+tilt of the axis in any direction needs both alpha and beta.
 """
 
 from __future__ import annotations
@@ -71,12 +71,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ParametricMotion(ElementaryMotion):
-    """A motion by an angle or length that is a parameter or the value of a joint.
+    """An elementary motion that depends on a parameter or a joint.
 
     Attributes:
-        parameter: Index of the parameter. For the motion of a joint: index of the gain; None without a gain.
+        parameter: Index of the parameter. A joint's motion has the index of the gain; None without a gain.
         joint: Index of the joint; None if the angle or length does not depend on a joint.
-        sense: -1 if the path leads from child to parent, or if the row subtracts the joint's value. Else 1.
+        sense: 1 or -1. The angle or length is multiplied by this sign.
     """
 
     parameter: int | None
@@ -106,7 +106,7 @@ class ParametricChain:
     def characteristic_length(self) -> float:
         """Sum (m) of the model's lengths, or 1 if the sum is 0.
 
-        An angle times this length is a distance.
+        The product of an angle and the characteristic length is a distance.
         """
         constant = [
             float(np.linalg.norm(step[:3, 3]))
@@ -144,7 +144,7 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return tip poses, and their derivatives with respect to the parameters.
 
-        `frames` is `self.frames(joint_values, parameter_values)`, if already computed.
+        `frames` is the result of the method `frames`; None if it has not been computed.
 
         Returns:
             (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
@@ -177,7 +177,7 @@ class ParametricChain:
         """Bound the rounding error of each number from `poses_and_jacobian`.
 
         Returns:
-            Bound, m; divide by `characteristic_length` for radians.
+            Bound for positions (m). The bound divided by `characteristic_length` is valid for angles (rad).
         """
         slides = [
             motion.joint
@@ -194,8 +194,9 @@ class ParametricChain:
 PARALLEL_TOLERANCE = math.radians(5.0)
 
 PARAMETER_SETS = ("base", "tool", "offsets", "origins", "gains")
-#: Name, kind and axis of each parameter of a joint origin. True means a rotation, False a translation.
-#: The axis is the index of a coordinate axis. The new origin is the product of the motions in this order.
+#: Name, kind and axis of each parameter of a joint origin.
+#: The kind is True for a rotation, False for a translation. The axes 0, 1 and 2 are x, y and z.
+#: The new origin is the product of the motions in this order.
 ORIGIN_PARAMETERS = (
     ("x", False, 0),
     ("y", False, 1),
@@ -205,7 +206,7 @@ ORIGIN_PARAMETERS = (
     ("rz", True, 2),
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
-#: Order of preference for the parameters of a revolute (True) or prismatic (False) joint.
+#: Parameters in order of preference; False: prismatic joint, True: another joint, base or tool.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
 #: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
 #: Further parameters move the joint's frame, but not its axis.
@@ -361,11 +362,11 @@ class _ModelBuilder:
         )
         groups = tuple(
             tuple(
-                index_of[*owner, what]
-                for what in preferences.get(owner[0], _ORIGIN_PREFERENCES[True])
-                if (*owner, what) in index_of
+                index_of[element, is_base_or_tool, what]
+                for what in (_ORIGIN_PREFERENCES[True] if is_base_or_tool else preferences[element])
+                if (element, is_base_or_tool, what) in index_of
             )
-            for owner in owners
+            for element, is_base_or_tool in owners
         )
         chain = ParametricChain(
             Path(tuple(self.steps)), tuple(self.parameters), np.array(self.initial_values)

@@ -44,15 +44,13 @@ from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, Kinem
 
 #: The rms position error of a plausible fit is at most this fraction of the reach.
 _MAX_ERROR_OF_REACH = 0.05
-#: A fit is not plausible if its error is a large fraction of the spread of the measured positions:
-#:     error > _UNEXPLAINED_OF_REACH * reach and error > _UNEXPLAINED_OF_SPREAD * spread
-#:     error     rms position error
-#:     spread    rms distance of the measured positions from their mean
+#: A fit is not plausible if its rms position error exceeds both fractions.
+#: The first is a fraction of the reach.
+#: The second is a fraction of the spread: the rms distance of the measured positions from their mean.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: A fit is not plausible if the fit hardly reduces a large error:
-#:     error > _NO_BETTER_OF_REACH * reach and error > _NO_BETTER_OF_BEFORE * error_before
-#:     error           rms position error
-#:     error_before    rms position error of a fit of base and tool alone
+#: A fit is not plausible if its rms position error exceeds both fractions.
+#: The first is a fraction of the reach.
+#: The second is a fraction of the rms position error of a fit of base and tool alone.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _MAX_ORIENTATION_ERROR = 0.2
@@ -65,19 +63,18 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
 #: Two configurations with equal rounded values count as one configuration.
 _JOINT_VALUE_RESOLUTION = 1e-6
-#: The change of a parameter is implausible if
-#:     |change| - _CHANGE_MARGIN_SIGMAS * (standard deviation) > limit.
+#: This number of standard deviations is subtracted from a parameter's change before the limit is applied.
 #: Therefore, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _CHANGE_MARGIN_SIGMAS = 5.0
-#: After a correction of the data, the error of the new fit must be at most ratio * (original error).
-#:     ratio = _MAX_SIMILAR_ERROR_RATIO     if the original fit is implausible
-#:     ratio = _MAX_SIMILAR_ERROR_RATIO     if the original fit changes a joint's zero by about half a turn
-#:     ratio = _MAX_IMPROVED_ERROR_RATIO    otherwise
+#: After a correction of the data, the error of the new fit is compared with the error of the original fit.
+#: The ratio of the errors must be at most `_MAX_IMPROVED_ERROR_RATIO`.
+#: `_MAX_SIMILAR_ERROR_RATIO` is allowed if the original fit is implausible.
+#: The same ratio is allowed if the original fit changes a joint's zero by about half a turn.
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
 #: The corrections are sorted by `_Trial.error_before`, the smallest first.
-#: Only for this number of corrections, all parameters are fitted again.
+#: All parameters are fitted again for the first `_MAX_FITS` corrections only.
 _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.
 #: urdfkin tries these shifts (number of rows).
@@ -123,9 +120,8 @@ class FitWithData:
     def reach(self) -> float:
         """Reach of the original model at the measured configurations, m.
 
-        The reach is the largest distance between the tip and the base, or between the tip and a joint axis.
-        Only revolute joints with a parameter for the zero position count.
-        The reach is at most `characteristic_length`.
+        The reach is the largest distance of the tip from the base, or from the axis of a parameter rz or
+        theta. The reach is at most `characteristic_length`.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
@@ -184,7 +180,7 @@ class FitWithData:
     def half_turn_zeros(self) -> list[str]:
         """Describe the joints with a change of the zero position by about half a turn.
 
-        Wrong signs of the next joint's values can cause this change.
+        Wrong signs of the next joint's values can change the zero position by half a turn.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -206,7 +202,11 @@ class FitWithData:
             levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
             least = _MAX_ERROR_OF_REACH * self.reach
             parameters = zip(model.chain.parameters, levers.tolist(), strict=True)
-            near = {p.element for p, lever in parameters if p.name in ("rz", "theta") and lever < least}
+            near = {
+                p.element
+                for p, lever in parameters
+                if p.name in ("rz", "theta") and not p.is_base_or_tool and lever < least
+            }
         deviations = np.sqrt(np.diag(fitted.covariance))
         for k, deviation in zip(self.identification.free_parameters, deviations.tolist(), strict=True):
             parameter = model.chain.parameters[k]
@@ -287,7 +287,7 @@ class _Correction:
 
     Attributes:
         first_pose: Index of the pose that belongs to the first row of `q`.
-        end_pose: Index after the pose that belongs to the last row of `q`; None: the last pose belongs to it.
+        end_pose: Index of the pose that belongs to the last row of `q`, plus 1; None for the last pose.
     """
 
     reason: str
@@ -372,7 +372,7 @@ class _Trial:
         self.measurements = Measurements(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = estimate_start_values(model, self.measurements)
         errors_before = _norm(compute_residuals(model, self.measurements, self.start), original.reach)
-        #: Rms error (m) of the poses for the start values; angles are multiplied by the reach.
+        #: Rms error (m) of the poses that the model predicts with the start values, before the fit.
         #: Base and tool are computed from the poses, and the other parameters have their original values.
         self.error_before = errors_before / math.sqrt(len(self.measurements))
 
@@ -405,5 +405,5 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm, m; angles are multiplied by the reach."""
+    """Return the norm (m) of the residuals. Rotation residuals (rad) are multiplied by the reach (m)."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))

@@ -1,10 +1,10 @@
 """Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
 The controller stores Denavit-Hartenberg parameters. The angle between two nominally parallel axes of the arm
-is about a milliradian, so their common normal is far away. The parameter d of one row can therefore be
-hundreds of metres. The parameters d of the next rows then cancel this offset. The driver's program
-`ur_calibration` shifts the link frames along their axes, so that these large offsets disappear. The program
-writes the pose of each joint in the frame of the previous joint: x, y, z, roll, pitch and yaw.
+is about a milliradian, so their common normal is far away. The parameters d of consecutive rows can therefore
+be hundreds of metres, and cancel each other. The driver's program `ur_calibration` shifts the link frames
+along their axes, so that all offsets become small. The program writes the pose of each joint in the frame of
+the previous joint: x, y, z, roll, pitch and yaw.
 
 The order of the rotations is ambiguous:
 
@@ -55,8 +55,7 @@ PARENT_JOINTS = {
 #: Uppercase letters mean moving axes, and lowercase letters mean fixed axes.
 ROTATION_ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _ORIGIN_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of random configurations for the fit of the joint origins.
-#: The check of the new URDF uses the same number of configurations.
+#: Number of random configurations for the fit of the joint origins, and for the check of the new URDF.
 _FIT_SAMPLES = 40
 _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, and largest difference of the new URDF's poses (m and rad).
@@ -124,8 +123,7 @@ def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "d
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
     If all joints turn about z, the joint origins are copied from the file. If a joint of the URDF has another
-    axis, the origins are fitted to the calibrated arm's poses. The poses of `tool0` in `base` are then those
-    of the calibrated arm.
+    axis, the origins are fitted to the calibrated arm's poses of `tool0` in `base`.
     """
     robot = as_robot(robot)
     origins = read_calibrated_origins(path, order)

@@ -4,8 +4,8 @@ This file is in a folder on PYTHONPATH, so that each Python process of a test ru
 
 The environment variable `URDFKIN_MUTANT` is the module's name and the mutant's number, for example
 `urdfkin.validation.error_stats:17`. If `URDFKIN_MUTANT` has no number, the variable
-`URDFKIN_MUTANT_CODE` describes the mutant. It is a JSON list of three texts: the name of a function, a piece
-of its code, and the new code.
+`URDFKIN_MUTANT_CODE` is a JSON list of three texts: the name of a function, a piece of its code, and the new
+code.
 """
 
 import importlib.abc
