@@ -45,7 +45,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # The time until the last call without a new chunk is not counted: urdfkin may compile kernels.
+        # Each call before the first new chunk restarts the clock, because urdfkin may compile kernels first.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:

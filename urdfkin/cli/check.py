@@ -237,8 +237,8 @@ _SIZE_LIMIT_HELP = {
     "depth": "Largest nesting depth of XML elements.",
     "elements": "Largest number of XML elements in a file.",
     "attributes": "Largest number of attributes of an XML element.",
-    "name": "Largest number of characters in a name.",
-    "number": "Largest number of characters in a number.",
+    "name": "Largest length of a name in characters.",
+    "number": "Largest length of a number's text in characters.",
     "markup": "Largest size of a tag, comment or processing instruction in bytes.",
 }
 size_limit_options = combine(

@@ -66,9 +66,8 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `dh_arguments` contains the values that are passed to `Robot.dh` as keyword arguments. `unchanged_table`
-    is the table file ROBOT if no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given. Otherwise,
-    `unchanged_table` is None.
+    `dh_arguments` contains the keyword arguments of `Robot.dh`. `unchanged_table` is the path of the table
+    ROBOT. An option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` sets `unchanged_table` to None.
     """
 
     robot: Robot

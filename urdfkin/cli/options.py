@@ -363,7 +363,7 @@ def locked_line(robot: Robot) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """A robot, a frame and the values to compute with.
+    """Inputs of a computation: a robot, a frame, configurations and motions.
 
     Attributes:
         q: (n, n_q) configurations, rad or m.

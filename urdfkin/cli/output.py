@@ -65,8 +65,7 @@ class Answer:
             array for npy, or the output as text. A function for a format in `TEXT_FORMATS` replaces
             `document` in this format.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
-        fit_document: Function that returns a document that fits the width of a terminal. None: use
-            `document`.
+        fit_document: Function that returns a document for the width of a terminal; None to use `document`.
     """
 
     document: Callable[[], TextDocument]

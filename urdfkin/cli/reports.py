@@ -164,8 +164,8 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
     "--factor",
     type=NumberInRange(1.0),
     default=2.0,
-    help="Report a regression if a quantity's largest disagreement, or its largest ratio to its bound, grows"
-    " by more than this factor.",
+    help="Report a regression if a quantity's largest disagreement grows by more than this factor. The factor"
+    " also limits the growth of the largest ratio to the bound.",
 )
 @markdown_option
 @answer_command(*TEXT_FORMATS, "json")

@@ -148,7 +148,7 @@ PANELS = (
     "--to",
     "end",
     metavar="VALUES",
-    help="End of a straight line in joint space, which is plotted; the format is the same as for --q.",
+    help="Plot a straight line in joint space that ends at VALUES. The format is the same as for --q.",
 )
 @click.option(
     "--duration",

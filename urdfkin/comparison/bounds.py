@@ -84,7 +84,7 @@ class DistanceSearch:
         self.rng = np.random.default_rng(seed)
         #: (4, 4) pose of B's base link in A's root frame, for A's zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: For A and for B: whether the base link and the root link belong to the same rigid body.
+        #: Whether each model's base link belongs to the same rigid body as its root link.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
@@ -320,7 +320,7 @@ class BoxBounds:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: For each robot, derivatives (nv, variables) of the coordinates with respect to the variables.
+        #: Derivatives of each robot's coordinates with respect to the variables: two (nv, variables) arrays.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)

@@ -65,7 +65,7 @@ class CertifiedRule(TypedDict):
 
     mimicked_joint: Annotated[str, doc("Name of the mimicked joint.")]
     multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
-    offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
+    offset: Annotated[float, doc("Number that is added to multiplier * (mimicked value), rad or m.")]
 
 
 Value = str | float | list[str | float | None] | CertifiedRule | None
@@ -83,10 +83,10 @@ class DifferenceEntry(TypedDict):
     a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
     b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
     radians: Annotated[
-        NonNegativeFloat, doc("Angular part of the difference, radians; 0 without an angular part.")
+        NonNegativeFloat, doc("Angular part of the difference, radians; 0 if no angle differs.")
     ]
     metres: Annotated[
-        NonNegativeFloat, doc("Linear part of the difference, metres; 0 without a linear part.")
+        NonNegativeFloat, doc("Linear part of the difference, metres; 0 if no distance differs.")
     ]
     detail: Annotated[
         Literal["", "alone", "converted"],
@@ -206,7 +206,7 @@ class SameCertificate(Header):
         doc("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
     joints: Annotated[list[CertifiedJoint], doc("Matched pairs of a joint of A and a joint of B.")]
-    links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Pairs of a link of A and a link of B.")]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Matched links: one of A and one of B.")]
     tools: Annotated[
         list[ToolEntry],
         doc(
@@ -230,7 +230,7 @@ class SameCertificate(Header):
         FrameEntry | None,
         doc(
             "The frame with the largest distance between the unchanged models, and an interval of this"
-            " distance; null if B needs no changes, or if no frames can be compared."
+            " distance. The value is null if B needs no changes. It is also null if no frames can be compared."
         ),
     ]
     checked: Confirmed

@@ -56,8 +56,8 @@ class ModelChange:
 
     Attributes:
         what: Name of the attribute, for example "origin x"; empty for a new or removed element.
-        size: Size of the change, for example "38.14 mm off". Empty for versions of the same format, and for
-            changes of values such as limits.
+        size: Size of the change, for example "38.14 mm off". Only changes of poses and axes between different
+            formats have a size; otherwise empty.
     """
 
     element: str
@@ -123,9 +123,8 @@ class Changes:
         sources: Sources of the old and the new version.
         changes: The changes. If both versions have the same format: first a change of the robot's name, then
             changes of joints, then changes of links.
-        effects: One entry for each joint or link whose changes move links. Each entry is the effect if all
-            other joints are unchanged. Without an entry: a joint that moves no frame, and a joint whose
-            effect cannot be computed, such as a new joint.
+        effects: Effect of each changed joint or link that moves frames, while all others are unchanged. A
+            new joint has no entry, because its effect cannot be computed.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
@@ -237,7 +236,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _changes_with_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield the differences that `same` finds if the joints cannot be compared one by one."""
+    """Yield differences of the whole models, for models whose joints cannot be compared one by one."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -263,7 +262,10 @@ def _change_of(difference: Difference) -> Iterator[ModelChange]:
 
 
 def _rename_like_a(result: Sameness) -> KinematicTree:
-    """Return B's tree with A's names for matched joints and links, and for joints before matched links."""
+    """Return B's tree with A's names for matched joints and links.
+
+    An unmatched joint also takes A's name if its child link is matched.
+    """
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
