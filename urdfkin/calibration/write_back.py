@@ -25,7 +25,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion_before_element
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals of written metres and radians: the precision of a double near 1.
+#: Written metres and radians have 15 decimals, the precision of a double near 1.
 _DECIMALS = 15
 _ROUNDING = 10.0**-_DECIMALS
 

@@ -216,8 +216,8 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be the name of a pose, such as ready. This pose then gives"
-        " the value of each fixed joint for which --lock has no value.",
+        " With --joints, the first --lock may be the name of a pose, such as ready. The pose then sets each"
+        " fixed joint that has no --lock value.",
     ),
     click.option(
         "--joints",

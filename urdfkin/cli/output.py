@@ -60,7 +60,7 @@ class Answer:
     """The result of a command.
 
     Attributes:
-        document: Function that returns a document with texts and tables, for the formats in `TEXT_FORMATS`.
+        document: Function that returns the texts and tables for the formats in `TEXT_FORMATS`.
         data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
             array for npy, or the output as text. A function for a format in `TEXT_FORMATS` replaces
             `document` in this format.
@@ -188,7 +188,7 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if `write_file` cannot write an output file.
 
-    A full disk is found only by `write_file`.
+    This check does not detect a full disk; `write_file` does.
     """
     for path in filter(None, paths):
         try:

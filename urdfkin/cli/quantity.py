@@ -619,7 +619,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _values_with_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield name and [value, lower bound, upper bound] of each quantity of sample `k`."""
+    """Yield each quantity of sample `k`: its name and the list [value, lower bound, upper bound]."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     yield "condition", [float(side[k]) for side in found.condition]

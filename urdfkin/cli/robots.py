@@ -34,8 +34,8 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 def robots_command(family: str | None) -> Answer:
     """List the robots of the catalogue, which every command loads by name.
 
-    The catalogue contains the URDF files of the package example-robot-data and of urdfkin. The base and the
-    tip in this list are the defaults of the options --base, --tip and --frame.
+    The catalogue contains the URDF files of the package example-robot-data and of urdfkin. The columns base
+    and tip show the default frames of the options --base, --tip and --frame.
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 #: Pattern of the names that completion offers.
 #: These names contain no character that a shell interprets.
-#: Bash separates words at colons, so names with colons do not match.
+#: The pattern also excludes colons, because Bash separates words at colons.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
 _MAX_BYTES = 10_000_000

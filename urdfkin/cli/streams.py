@@ -1,8 +1,7 @@
 """Write to the standard streams without tracebacks, and escape control characters in names.
 
-Standard output may be closed, a file on a full disk, or a pipe to a program that exits early. The
-encoding of standard output may not support every character of a joint's name. In each of these cases, the
-command ends without a traceback.
+A command ends without a traceback if standard output is closed, if the disk is full, or if the reader of a
+pipe exits early. The same applies if the encoding does not support a character of a joint's name.
 
 `wrap_streams` wraps standard output and standard error in a `SafeStream`, which escapes control characters
 and commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of

@@ -105,9 +105,9 @@ def _open_results(
 def _study_accuracy(
     source: Robot | str, settings: StudySettings, sha256: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
-    """Return the accuracy result of a robot, and whether to store this result.
+    """Return the accuracy result of a robot, and true if the result may be stored.
 
-    A failure is stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
+    A failure may be stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
     """
     import numpy as np
 

@@ -202,7 +202,7 @@ class DistanceSearch:
         """Return distances at the values nearest to zero, at corners, and at random values.
 
         Returns:
-            (n, frames) distances, m, and (n, variables) values of the variables.
+            Distances (n, frames) in m, and values (n, variables) of the variables.
         """
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
@@ -298,7 +298,7 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 #: With this number of boxes, `tighten` takes one or two seconds per frame.
 MAX_BOXES = 2**17
 #: Number of boxes in one batch. The Jacobians take 48 bytes for each box and coordinate.
-#: Without batches, the 2^22 boxes of `recheck` would therefore take gigabytes.
+#: The 2^22 boxes of `recheck` would take gigabytes in one batch.
 BOXES_PER_BATCH = 2**16
 
 

@@ -135,7 +135,7 @@ class ToolEntry(TypedDict):
 class Rounding(TypedDict):
     """Largest distance and angle that `same` treats as rounding errors.
 
-    The distance holds while planar, floating and unlimited prismatic joints travel at most 10 m.
+    `metres` assumes that planar, floating and unlimited prismatic joints travel at most 10 m.
     """
 
     metres: NonNegativeFloat
@@ -230,7 +230,7 @@ class SameCertificate(Header):
         FrameEntry | None,
         doc(
             "The frame with the largest distance between the unchanged models, and an interval of this"
-            " distance. The value is null if B needs no changes. It is also null if no frames can be compared."
+            " distance. The entry is null if B needs no changes. It is also null without common frames."
         ),
     ]
     checked: Confirmed

@@ -37,14 +37,14 @@ from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Default values of joint attributes: for every joint, for a joint with an axis, and for a mimic joint.
+#: Default values of attributes that a joint's elements may omit.
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Values of `ModelChange.what` for changes that move a link.
-#: Only changes between files of different formats have these values.
+#: The values occur only if the files have different formats.
 _MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -121,7 +121,7 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes. If both versions have the same format: first a change of the robot's name, then
+        changes: The changes. For versions of the same format, a change of the robot's name comes first, then
             changes of joints, then changes of links.
         effects: Effect of each changed joint or link that moves frames, while all others are unchanged. A
             new joint has no entry, because its effect cannot be computed.
@@ -151,8 +151,8 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     """List the changes between two versions of a robot description.
 
     Versions of the same format are compared attribute by attribute. If the formats differ, for example URDF
-    and MJCF, `diff` lists the differences that `same` finds. Matched joints and links then have the names of
-    the old version.
+    and MJCF, `diff` lists the differences that `same` finds. For matched joints and links, `diff` then uses
+    the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -337,7 +337,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of the joint `name` alone; None if no frame moves or the effect is not computable."""
+    """Return the effect of one changed joint; None if the effect is zero or not computable."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

@@ -1,7 +1,7 @@
 """Compare how other libraries read a robot file: the joints, the order of the joints, and the link poses.
 
 Each library runs in a separate process, with its adapter in `urdfkin/verify/adapters.py`. A joint counts as
-different if the pose of its child link relative to its parent link differs.
+different if its child link has a different pose in the parent link's frame.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ class LibraryReading:
         refused: Reason why the library does not read the file; None if it reads the file.
         missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
             the USD file) are listed. A root link that `load` added is not listed.
-        worst: Largest difference between matching entries of link poses, relative to the first common link. 0
-            if rounding can explain the difference.
+        worst: Largest difference between matching entries of the link poses in the frame of the first common
+            link. 0 if rounding can explain the difference.
     """
 
     library: str
