@@ -33,7 +33,7 @@ _ROUNDING = 10.0**-_DECIMALS
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Write new joint origins into a URDF.
 
-    A number of xyz and rpy that is unchanged up to rounding keeps its digits.
+    A number in the attribute xyz or rpy keeps its digits if it changes only by rounding.
 
     Args:
         data: The original URDF.

@@ -24,7 +24,7 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Commands below each heading of the help page, each with its module in `urdfkin.cli` and its summary.
+#: Commands below each heading of the help page. Each command has a module in `urdfkin.cli` and a summary.
 #: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
 _COMPUTE_HEADING = "Compute"
 _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
@@ -252,6 +252,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The last line of the output already states what is not verified, so this warning is hidden.
+    # The warning "not verified" is hidden, because the last line of the output repeats it.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

@@ -112,7 +112,7 @@ def calibrate_command(
     """Fit the parameters of ROBOT to measured poses, and write the calibrated robot to a new file.
 
     The new URDF differs from that of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at the
-    measured configurations. With --ur, the configurations of this check are random. If ROBOT is the file of a
+    measured configurations. With --ur, Pinocchio uses random configurations. If ROBOT is the file of a
     Denavit-Hartenberg table, the command fits the numbers of the table. Pinocchio checks the new table in the
     zero configuration. If neither --poses nor --ur is given, the command lists which parameters are
     identifiable in principle.

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Minimum time (s) between two lines about the progress.
-#: `_LINE_INTERVAL` is for lines of text, `_JSON_INTERVAL` for lines of JSON.
+#: Minimum time (s) between two progress lines of text, and between two progress lines of JSON.
 #: The last line of JSON is printed at once.
 _LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 

@@ -73,8 +73,8 @@ class CheckOutcome:
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
         files_with_errors: Files with a reported finding of severity error. --fix does not change these files.
             A warning that --strict reports as an error does not count.
-        unwritable: Names of texts that --fix cannot write: standard input, a pipe, an expanded .xacro file,
-            and a robot of the catalogue.
+        unwritable: Names of inputs that --fix cannot change: standard input, a pipe, an expanded .xacro file,
+            or a robot of the catalogue.
     """
 
     files: list[str] = field(default_factory=list)

@@ -112,8 +112,8 @@ derivation_options = combine(
     _choice(
         "--slide",
         ("drawn", "minimal"),
-        "Position of a prismatic joint's axis. drawn: as in the URDF. minimal: through the origin of the next"
-        " or previous revolute joint, so that the length a between the axes is 0.",
+        "Position of a prismatic joint's axis. drawn: the axis is as in the URDF. minimal: the axis"
+        " passes through the origin of the next or previous revolute joint, so that the length a is 0.",
     ),
     click.option(
         "--like",

@@ -126,8 +126,8 @@ def same_command(
     configuration in which the distance is at least the lower bound. The upper bound is proven for all
     configurations within the joint limits.
 
-    The numbers of a USD file are rounded to single precision. If this rounding explains the difference of
-    each joint, A and B are the same up to single precision.
+    The numbers of a USD file are rounded to single precision. If these rounding errors explain the
+    difference of every joint, A and B are the same up to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
     1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are
@@ -229,10 +229,9 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     For each changed joint, the command prints the frame that the changes of this joint move farthest. The
     command also prints this frame's largest displacement in all configurations within the joint limits. If
     the changes only rotate frames, the command prints the largest rotation. OLD and NEW have the same joint
-    coordinates in each configuration. The last line of the output states how far all changes together move
-    the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the
-    changes are the differences that `urdfkin same` finds. If you name more than two robots, the command
-    compares each pair.
+    coordinates in each configuration. The last line of the output is the largest displacement that all
+    changes together cause. If OLD and NEW have different formats (URDF, MJCF or USD), the command prints the
+    differences that `urdfkin same` finds. If you name more than two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

@@ -224,8 +224,8 @@ robot_options = combine(
         metavar="NAMES",
         expose_value=False,
         callback=_store_as("joints", lambda words: [name.strip() for name in words.split(",")]),
-        help="Keep only these joints, separated by commas. Each other joint is fixed at its value in --lock,"
-        " or at 0 without a value.",
+        help="Keep only these joints, separated by commas. All other joints are fixed at their --lock values."
+        " A joint without a --lock value is fixed at 0.",
     ),
 )
 robot_argument = combine(
@@ -431,7 +431,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def disabled_options(source: str) -> dict[str, Any]:
-        """Disable the xacro options if only other sources are xacro files; the same for USD options."""
+        """Disable the options for xacro and USD files that apply only to another source."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None

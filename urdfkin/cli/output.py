@@ -38,7 +38,7 @@ _SUFFIXES = {
 }  # fmt: skip
 _F = TypeVar("_F", bound=Callable[..., Any])
 #: Maximum number of characters in a line of a table.
-#: All cells of a column have the same width, so one long name could fill the memory.
+#: Cells are padded to the widest cell of their column, so one very long name could fill the memory.
 _MAX_WIDTH = 10_000
 
 

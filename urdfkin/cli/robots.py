@@ -78,8 +78,8 @@ def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
     The joints have the same order as in q, in v and in the columns of a Jacobian. Pinocchio uses the same
-    order of the joints. The last line compares this order with the order of the joints in the file. Limits
-    are in rad and rad/s, for prismatic joints in m and m/s. The first link is the root. If a link has several
+    order of the joints. The last line reports whether the file lists the joints in another order. Limits are
+    in rad and rad/s, for prismatic joints in m and m/s. The first link is the root. If a link has several
     children, a branch of the drawn tree leads to each child. A link without a branch is the only child of the
     link above it.
     """
@@ -219,7 +219,7 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
             old, new, star = (
                 ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
             )
-            yield f"# {letter}: this conversion needs more than a new order, factors and zeros. Use urdfkin:"
+            yield f"# {letter}: indexing, factors and zeros cannot express this conversion. Use urdfkin:"
             yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

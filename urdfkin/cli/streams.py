@@ -186,8 +186,7 @@ class SafeStream:
             m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
         ]
         # Only the last 16 characters of a long line are stored.
-        # An "x" in front of the characters stands for the rest of the line.
-        # Without the "x", "::" in the characters could look like the beginning of the line.
+        # The "x" replaces the deleted characters, so that a later "::" is not at the start of the line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (

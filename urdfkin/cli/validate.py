@@ -215,8 +215,8 @@ def validate_command(
     configurations in which all joints are at their lower or upper limits. In 4 of 25 samples, joint
     velocities and accelerations are a hundred times larger than in the others.
 
-    Disagreements are in multiples of eps * scale. Here eps is 2.2e-16, and scale is the size of the terms
-    that are added to compute the number. Rounding alone gives 1 to 10.
+    Disagreements are in multiples of eps * scale. The number eps is 2.2e-16; scale is the size of the terms
+    in the sum of the computed number. Rounding alone causes disagreements of 1 to 10.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or a folder. In a folder, the command validates all
     .urdf files, also in subfolders, but not in hidden folders.

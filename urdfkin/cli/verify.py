@@ -58,8 +58,8 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     "--factor",
     type=NumberInRange(min=0, min_open=True),
     default=1.0,
-    help="Multiply the error bound by this factor. A function with more rounding operations than urdfkin's"
-    " recursion may need a factor above 1.",
+    help="Multiply the error bound by this factor. Use a factor above 1 if the function rounds more often"
+    " than urdfkin's recursion.",
 )
 @click.option(
     "--batch", is_flag=True, help="Call the function with n configurations at once: q is an array (n, nq)."

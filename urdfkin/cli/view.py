@@ -79,8 +79,8 @@ def view_command(
     of q accepts and shows values in that convention.
 
     The printed address ends with a secret key. Open the whole address, including the key. Show the address
-    only to people who may see and move the robot. Other web pages and other users of this machine
-    have no access.
+    only to people who may see and move the robot. Without the key, other web pages and other users of the
+    machine cannot use the viewer.
     """
     from urdfkin.view.server import has_screen, new_server, open_page
     from urdfkin.view.viewer import Viewer

@@ -5,8 +5,8 @@ coordinate at a time. The largest distance found is a lower bound of the true la
 
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
 between the models. Each term is the largest effect of one difference over all configurations. If the models
-differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. For
-this, `tighten` divides the ranges of the variables into boxes, and bounds the distance in each box.
+differ in many places, the sum is far above the largest distance. `tighten` divides the ranges of the
+variables into boxes, and bounds the distance in each box. The largest of these bounds is sharper.
 
     D(q) = p_B - p_A              difference of the frame's positions in B and A
     D_i                           derivative of D with respect to variable i
@@ -138,7 +138,8 @@ class DistanceSearch:
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
         """Check whether two configurations correspond.
 
-        Each variable must be within its search range `ends`. A's planar and floating joints must be neutral.
+        Each variable must be within its search range `ends`. The planar and floating joints of A must be in
+        their neutral configurations.
 
         Args:
             q_a: (1, nq) configuration of A.
@@ -255,9 +256,10 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (frames, starting points, trials), m, of frame k at the values `z[k]`.
+        """Return the distances (frames, starting points, trials), m.
 
-        `z`: (frames, starting points, trials, variables)
+        For frame k, the variables have the values `z[k]`. The shape of `z` is (frames, starting points,
+        trials, variables).
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -361,7 +363,10 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a `point` (3,) given in `frame`."""
+        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
+
+        The vector `point` (3,) is in the axes of `frame`.
+        """
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not point.any():
@@ -376,7 +381,7 @@ def tighten(
     """Try to prove a smaller upper bound on a frame's distance.
 
     Args:
-        search: Search between the same two models.
+        search: Search for the distances between the two models.
         frame: The frame.
         target: Bound at which the proof ends, m.
         upper: A proven bound, m.

@@ -41,8 +41,7 @@ from urdfkin.verify.oracles import PINOCCHIO, package_versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative tolerance of the numbers in a certificate.
-#: For numbers near zero, the tolerance is absolute (m or rad).
+#: Relative tolerance of the numbers in a certificate, and absolute tolerance (m or rad) near zero.
 #: The tolerances allow for different rounding errors on the machine that wrote the certificate.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: The relative tolerance of a bound is this number times the machine epsilon.
@@ -98,15 +97,15 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """Pose of a planar or floating joint in B: before * (pose in A) * behind."""
+    """Conversion of the pose T_A of a planar or floating joint in A to the pose T_B in B: T_B = M T_A N."""
 
     before: Annotated[TransformRows, doc("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[TransformRows, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
         doc(
-            "Whether the formula contains the inverse of the pose in A. The inverse is needed if the joint's"
-            " parent link in A corresponds to the joint's child link in B."
+            "Whether the formula contains the inverse of the pose in A. It does if the joint's parent link in"
+            " A corresponds to the joint's child link in B."
         ),
     ]
 
@@ -441,7 +440,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Compare two entries up to rounding; `zero` is the tolerance of numbers near zero."""
+    """Compare two entries up to rounding. `zero` is the absolute tolerance."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)

@@ -42,11 +42,11 @@ _MAX_CHARACTERS = 200
 
 @dataclass(frozen=True, slots=True)
 class ReaderDifference:
-    """A joint that a library reads differently.
+    """A joint with another pose or motion in a library's model.
 
     Attributes:
-        size: Largest difference between an entry of urdfkin's matrix and the same entry of the library's
-            matrix. The matrix is the pose of the child link in the parent link's frame.
+        size: Largest difference between matching entries of urdfkin's and the library's matrix. The matrix is
+            the pose of the child link in the parent link's frame.
     """
 
     joint: str
