@@ -131,7 +131,7 @@ class UpdatedURDF:
 
     @cached_property
     def displacements(self) -> dict[str, tuple[float, float]]:
-        """Change of each joint's origin, by joint name: distance (m) and angle (rad)."""
+        """Displacement of each joint's origin, by joint name, as a distance (m) and an angle (rad)."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {

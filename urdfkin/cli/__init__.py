@@ -57,7 +57,7 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
         "export": ("export", "Export verified kinematics as code in C, Python, MATLAB and other languages."),
     },
     "Compare and calibrate": {
-        "same": ("models", "Prove that two robot models move alike, or bound the distance of their frames."),
+        "same": ("models", "Prove that two robot models move alike, or bound the distances of their frames."),
         "diff": (
             "models",
             "List the changes between two versions of a robot file and their effect on motion.",

@@ -70,8 +70,8 @@ derivation_options = combine(
     _choice(
         "--near-parallel",
         ("hayati", "strict"),
-        "Parameters for nearly parallel joint axes. hayati: five, with the angle beta. strict: only four, and"
-        " offsets can become very large.",
+        "Parameters for nearly parallel joint axes. hayati: rows with five parameters, including the angle"
+        " beta. strict: rows with four parameters, which may contain very large offsets.",
     ),
     click.option(
         "--snap",

@@ -42,8 +42,8 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 #: Options of `urdfkin same` that affect only a new comparison, and the option --recheck itself.
 #: With --recheck, the other options of this tuple are errors.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
-#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
-#: `urdfkin diff` rejects a revision, unless a file has this name.
+#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf. `urdfkin diff` rejects revisions.
+#: A file with such a name is accepted.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 
@@ -226,12 +226,12 @@ def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
-    For each changed joint, the command prints the frame that the changes of this joint move farthest. The
-    command also prints this frame's largest displacement in all configurations within the joint limits. If
-    the changes only rotate frames, the command prints the largest rotation. OLD and NEW have the same joint
-    coordinates in each configuration. The last line of the output is the largest displacement that all
-    changes together cause. If OLD and NEW have different formats (URDF, MJCF or USD), the command prints the
-    differences that `urdfkin same` finds. If you name more than two robots, the command compares each pair.
+    For each changed joint, the command prints the frame with the largest displacement, and the largest
+    displacement in all configurations within the joint limits. If the changes only rotate frames, the command
+    prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The last line of the
+    output is the largest displacement that all changes together cause. If OLD and NEW have different formats
+    (URDF, MJCF or USD), the command prints the differences that `urdfkin same` finds. If you name more than
+    two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

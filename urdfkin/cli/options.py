@@ -482,7 +482,7 @@ def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArr
         raise InputError(
             problem,
             found=", ".join(str(len(batch)) for batch in batches),
-            remedy="give one sample, or the same number of samples, for each of them",
+            remedy="give each batch one sample or the same number of samples",
         )
     return [np.ascontiguousarray(np.broadcast_to(batch, (n, *batch.shape[1:]))) for batch in batches]
 

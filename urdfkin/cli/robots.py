@@ -79,9 +79,9 @@ def info_command(robot: str) -> Answer:
 
     The joints have the same order as in q, in v and in the columns of a Jacobian. Pinocchio uses the same
     order of the joints. The last line reports whether the file lists the joints in another order. Limits are
-    in rad and rad/s, for prismatic joints in m and m/s. The first link is the root. If a link has several
-    children, a branch of the drawn tree leads to each child. A link without a branch is the only child of the
-    link above it.
+    in rad and rad/s; those of prismatic joints are in m and m/s. The first link is the root. If a link has
+    several children, a branch of the drawn tree leads to each child. A link without a branch is the only
+    child of the link above it.
     """
     loaded = load_robot(robot)
     data = {

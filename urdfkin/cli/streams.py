@@ -116,9 +116,8 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum number of stored characters of an unfinished line.
-#: A longer line is stored only in part.
-#: The line is needed because a CI command may be written in several pieces.
+#: Maximum number of stored characters of an unfinished line. A longer line is stored only in part.
+#: The stream stores unfinished lines because a CI command may be written in several pieces.
 _MAX_STORED = 64
 
 

@@ -193,9 +193,10 @@ def plot_command(
 
     The plot has panels for q, v and a with their limits, and for the frame's position, velocity and
     acceleration. Other panels show the parts of the acceleration, the singular values, and the result of the
-    check. --trajectory reads a CSV or .npz file. --to makes a straight line in joint space that begins and
-    ends at rest. A floating base moves along a screw. With --convention, the file and the values of --from
-    and --to are in that convention. The panels always show the joint values of the URDF, in rad and m.
+    check. --trajectory reads a CSV or .npz file. With --to, the robot moves along a straight line in joint
+    space, and is at rest at both ends. A floating base moves along a screw. With --convention, the file and
+    the values of --from and --to are in that convention. The panels always show the joint values of the URDF,
+    in rad and m.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

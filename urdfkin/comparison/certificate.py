@@ -156,15 +156,15 @@ class FrameEntry(TypedDict):
     upper: Annotated[
         NonNegativeFloat | None,
         doc(
-            "Proven upper bound of the distance in all configurations within limits, metres; null if none is"
-            " proven."
+            "Proven upper bound of the distance, metres; null without a proof. The bound holds in all"
+            " configurations within limits."
         ),
     ]
     radians: Annotated[
         NonNegativeFloat | None,
         doc(
-            "Proven upper bound of the angle in all configurations within limits, radians; null if none is"
-            " proven."
+            "Proven upper bound of the angle, radians; null without a proof. The bound holds in all"
+            " configurations within limits."
         ),
     ]
     radians_seen: Annotated[
@@ -181,7 +181,7 @@ class Confirmed(TypedDict):
     by: Annotated[str, doc("Name and version of the oracle; empty if the oracle did not check the bounds.")]
     configurations: Annotated[Count, doc("Number of configurations at which the oracle checked the bounds.")]
     metres: Annotated[NonNegativeFloat, doc("Largest distance that the oracle computed, metres.")]
-    reason: Annotated[str, doc("Reason why the oracle computed no distances; empty if it computed them.")]
+    reason: Annotated[str, doc("Reason why the oracle computed no distances, or empty.")]
 
 
 class SameCertificate(Header):
@@ -196,8 +196,8 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. Differences without matched joints or links"
-            " come last."
+            "Differences, in order from the base to the tips. Differences of unmatched joints and links come"
+            " last."
         ),
     ]
     remarks: Annotated[
@@ -209,7 +209,7 @@ class SameCertificate(Header):
     tools: Annotated[
         list[ToolEntry],
         doc(
-            "Pairs of matched links with different poses on matching rigid bodies. `same` reports the links"
+            "Matched links that have different poses on their matching rigid bodies. `same` reports the links"
             " of a pair as different tools."
         ),
     ]
@@ -218,7 +218,7 @@ class SameCertificate(Header):
     ]
     base: Annotated[TransformRows, doc("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), doc("Poses are compared relative to these links of A and B.")
+        list[str], of_length(2), doc("Links of A and B that serve as reference frames of the poses.")
     ]
     rounding: Rounding
     frames: Annotated[
@@ -490,7 +490,10 @@ def _interval_errors(
     *,
     use_branch_and_bound: bool,
 ) -> Iterator[str]:
-    """Yield an error for each wrong or unproven bound; `rounding` is a distance (m) and an angle (rad)."""
+    """Yield an error for each wrong or unproven bound.
+
+    `rounding` contains the largest rounding errors of a distance (m) and an angle (rad).
+    """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)
