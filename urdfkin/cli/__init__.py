@@ -47,7 +47,7 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
         "imu": ("quantity", "Compute the readings of an accelerometer and a gyroscope on a frame."),
     },
     "Tables and code": {
-        "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
+        "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare a published table with a robot."),
         "screws": (
             "paths",
             "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",

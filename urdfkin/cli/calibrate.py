@@ -148,7 +148,7 @@ def calibrate_command(
 
     def write_answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # JSON is returned as text: `Answer` would add the entries `verified` and `check` to a mapping.
+        # JSON is returned as text, because `Answer` adds the keys `verified` and `check` to a mapping.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMATS)
         context.exit(code)
 

@@ -101,7 +101,7 @@ derivation_options = combine(
     _choice(
         "--first",
         ("base", "joint"),
-        "Place frame 0 at the base, or at the first joint as in Craig's book, where d1 is zero.",
+        "Position of frame 0. base: at the base. joint: at the first joint as in Craig's book; d1 is zero.",
     ),
     _choice(
         "--sign",
@@ -203,12 +203,12 @@ def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
 
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
     .tsv, .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention.
-    With an option that affects the rows, such as --tip or --snap, the command derives a new table of the same
-    robot. See `urdfkin explain urdf-to-dh`.
+    An option that affects the rows, such as --tip or --snap, makes the command derive a new table. See
+    `urdfkin explain urdf-to-dh`.
 
-    Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, the compared table differs, or the
-    table agrees only because the fitted base, tool and joint offsets hide a mistake. 2: bad input. 3: not
-    checked, or the rounding error of a strict table is larger than that of the robot.
+    Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, the compared table differs, or its
+    fitted base, tool and joint offsets hide a mistake. 2: bad input. 3: not checked, or the rounding error of
+    a strict table is larger than that of the robot.
     """
     from urdfkin.cli.dh_tables import DHRequest, make_dh_answer
     from urdfkin.dh.parse_table import is_table_file

@@ -151,7 +151,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged_table is not None:
         table = read_table_or_screws(expand_home(request.unchanged_table))
-        # If the file contains screws, the call of `Robot.dh` below derives a table.
+        # For screws, the rest of this function derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck itself.
-#: With --recheck, the other options of this tuple are errors.
+#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck.
+#: --recheck cannot be combined with the other options of this tuple.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
 #: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf. `urdfkin diff` rejects revisions.
 #: A file with such a name is accepted.
@@ -73,8 +73,8 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes (parts of the joint space) that the search for sharper upper bounds keeps"
-    " in memory; 0: no search.",
+    help="Maximum number of boxes (parts of the joint space) in memory during the search for sharper upper"
+    " bounds. 0: no search.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
@@ -288,7 +288,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 @seed_option
 @answer_command()
 def readers_command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
-    """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
+    """Compare how other libraries read ROBOT: the joints, the joint order, and the poses of all links.
 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
     Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each

@@ -128,7 +128,7 @@ _LOAD_OPTIONS_KEY = "urdfkin.load_options"
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
     """Return a callback that stores an option's value for `load_options`.
 
-    If `always` is true, the callback stores a value even if the user does not give the option.
+    With `always`, the callback also stores the value of an option that the user omits.
     """
 
     def store_option(context: click.Context, _: click.Parameter, value: Any) -> None:
@@ -455,8 +455,8 @@ def read_inputs(
 ) -> Inputs:
     """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    If one of the arrays has several samples, single samples of the other arrays are repeated. `option` is the
-    option that gives q. If `option` is not --q, the caller must reject an unused --seed.
+    A single sample of q, v or a is repeated for all samples of the other arrays. `option` is the option that
+    gives q. If `option` is not --q, the caller must reject an unused --seed.
     """
     import numpy as np
 
@@ -521,8 +521,8 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample per line.
 
-    Return the samples, and the layout that fits the number of columns. A layout is a list of column names.
-    `units` is as in `read_columns`.
+    A layout is a list of column names. Return the samples, and the layout with as many names as the file has
+    columns. `units` is as in `read_columns`.
     """
     import numpy as np
 

@@ -509,9 +509,9 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     accelerometer at rest reads 9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
 
     The input is a configuration --q, joint velocities --v and joint accelerations --a. The input may also be
-    a batch of configurations, or a --trajectory. The motion of the root link is given by --base-velocity and
-    the other --base options, or by arrays in the .npz file. With --root-joint floating, the pose of the root
-    link is part of --q. See `urdfkin explain gravity-in-an-acceleration`.
+    a batch of configurations, or a --trajectory. --base-velocity and the other --base options set the motion
+    of the root link. An .npz file may also contain this motion. With --root-joint floating, the pose of the
+    root link is part of --q. See `urdfkin explain gravity-in-an-acceleration`.
     """
     from urdfkin.robot.trajectory import parse_numbers
 

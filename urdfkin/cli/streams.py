@@ -170,7 +170,7 @@ class SafeStream:
         self.stream.write(text)
 
     def _escape_commands(self, text: str) -> str:
-        """Escape CI commands in `text`; an earlier call may have written the beginning of a command."""
+        """Escape CI commands in `text`. A command may begin in the text of an earlier call."""
         first, *rest = text.split("\n")
         lines = [self._escape_commands_in_line(first)]
         for line in rest:

@@ -393,8 +393,8 @@ def tighten(
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     moving_pairs = [pair for pair in pairs if pair is not None]
-    # An unlimited revolute joint repeats its poses after one turn.
-    # Boxes cover an unlimited range only for revolute joints with the multiplier 1 or -1.
+    # A revolute joint with the multiplier 1 or -1 repeats its poses after one turn of its variable.
+    # Boxes over one turn therefore cover an unlimited variable, but only of such joints.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, moving_pairs, strict=False)
@@ -431,7 +431,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return the number of halvings until (1/2) sum_ij M_ij h_i h_j < `upper`; each halves one h_i."""
+    """Count the halvings of one h_i at a time until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

@@ -149,8 +149,8 @@ class FrameEntry(TypedDict):
     lower: Annotated[
         NonNegativeFloat,
         doc(
-            "Lower bound of the largest distance, metres: the computed distance if A is at `q_a` and B is at"
-            " `q_b`, minus the largest rounding error."
+            "Lower bound of the largest distance, metres: the computed distance at `q_a` and `q_b`, minus the"
+            " largest rounding error."
         ),
     ]
     upper: Annotated[
@@ -196,8 +196,8 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. Differences of unmatched joints and links come"
-            " last."
+            "Differences, in order from the base to the tips. Unmatched joints and links on different joints"
+            " come last."
         ),
     ]
     remarks: Annotated[
@@ -279,8 +279,8 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` also matches the
-    joints as `same` does without `map`. The verdict of this second comparison must also be "differs".
+    `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` makes a second
+    comparison, in which `same` matches the joints. The second verdict must also be "differs".
 
     Returns:
         A line for each statement that is wrong or not proven.

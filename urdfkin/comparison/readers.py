@@ -257,8 +257,8 @@ def _find_cause(
 ) -> tuple[str, str]:
     """Return the cause of a difference, for example "origin rpy" or "axis", and a description.
 
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
-    pose is at the neutral configuration.
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The pose
+    with index 0 belongs to the neutral configuration.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
