@@ -55,8 +55,8 @@ _FORMATS = (*TEXT_FORMATS, "json")
     "--order",
     type=click.Choice(["driver", "urdf"]),
     default="driver",
-    help="With --ur: rotation that roll, pitch and yaw in the file describe. driver: Rx(roll) Ry(pitch)"
-    " Rz(yaw). urdf: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.",
+    help="With --ur: rotation of roll, pitch and yaw in the file. driver: Rx(roll) Ry(pitch) Rz(yaw). urdf:"
+    " Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.",
 )
 @path_options
 @click.option(
@@ -88,7 +88,7 @@ _FORMATS = (*TEXT_FORMATS, "json")
     "--all",
     "write_all",
     is_flag=True,
-    help="Write all fitted parameters, not only those that changed by more than 2 sigma.",
+    help="Write all fitted parameters. By default, only changes of more than 2 sigma are written.",
 )
 @click.option("--force", is_flag=True, help="Write the calibration even if urdfkin finds it implausible.")
 @format_option(*_FORMATS, help_="Output format of the report.")

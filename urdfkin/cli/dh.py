@@ -88,9 +88,8 @@ derivation_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rule for the rows of consecutive parallel axes. last: the last of these rows contains the sum of"
-        " the offsets d. first: the first row contains the sum. each: each row contains the offset of its"
-        " own link.",
+        "Rows that contain the offsets d of consecutive parallel axes. last: the last row contains their sum."
+        " first: the first row contains their sum. each: each row contains the offset of its own link.",
     ),
     click.option(
         "--flip",

@@ -474,7 +474,7 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat each array with one row to the length of the longest array; reject other lengths."""
+    """Repeat arrays with one row up to the length of the longest array."""
     import numpy as np
 
     n = max(map(len, batches))

@@ -82,10 +82,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the output in the format `form`.
-
-        Also return True if the output already contains the line `check`, and False otherwise.
-        """
+        """Return the output in the format `form`, and whether the output already contains `check`."""
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -221,7 +218,7 @@ def certificate_exit_code(certificate: Certificate) -> int:
 
 
 def format_pinocchio_check(check: object | None) -> tuple[str, int]:
-    """Return the line that states the result of Pinocchio's check, and the exit code of the command.
+    """Return a line with the result of Pinocchio's check, and the command's exit code.
 
     `check` is the result of the check, or None if nothing was checked.
     """

@@ -175,9 +175,9 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     "--opw",
     type=FiniteNumber(),
     metavar="MM",
-    help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if a"
-    " coordinate of the tip's position is wrong by more than MM millimetres, or an entry of the tip's"
-    " rotation matrix by more than MM / 1000.",
+    help="Print the parameters of an OPW solver as YAML, instead of the structure. MM is the largest allowed"
+    " error of the tip's coordinates in millimetres. MM / 1000 is the largest allowed error of the entries of"
+    " the tip's rotation matrix.",
 )
 @verify_option
 @answer_command(*TEXT_FORMATS, "json")

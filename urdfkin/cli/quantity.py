@@ -363,7 +363,7 @@ _POSE_FORMS = {
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
 @quantity_options(
     PLACEMENT.inputs,
-    frame_name_option("--relative-to", "Link or joint in whose frame the pose is expressed.", "the world"),
+    frame_name_option("--relative-to", "Link or joint that is the reference frame of the pose.", "the world"),
     click.option(
         "--as",
         "form",
@@ -456,7 +456,8 @@ REPRESENTATIONS = (
         "--nearest",
         type=NumberInRange(min=0.0),
         metavar="RAD",
-        help="Smallest allowed distance (rad) of the Euler angles from their singularity.",
+        help="The command fails if the distance (rad) of the Euler angles from their singularity is not larger"
+        " than this number.",
         show_default="1e-9",
     ),
 )

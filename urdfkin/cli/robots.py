@@ -132,8 +132,8 @@ def order_command(robot: str, start: str | None, end: str | None) -> Answer:
 
     For each joint and tool, the table contains the joint's index in q. If the joint's index in v differs, the
     table contains both indices: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With
-    --from or --to, the command prints Python code that converts q and v. NAME is a tool from the table; FILE
-    is a TOML file with your own order, signs, units and motor zeros (docs/conventions.md).
+    --from or --to, the command prints Python code that converts q and v. NAME is a tool in the table. FILE
+    is a TOML file that defines your own order, signs, units and motor zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:

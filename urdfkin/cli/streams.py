@@ -33,8 +33,7 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Commands print their own line about joint values that look like degrees.
-    # Therefore, DegreesWarning is hidden.
+    # DegreesWarning is hidden, because each command itself reports joint values that look like degrees.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -72,7 +71,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _report_write_errors(stream: Any, descriptor: int) -> Any:
-    """Return a standard stream that reports write errors; return any other stream unchanged."""
+    """Wrap a standard stream, so that it reports write errors. Other streams are returned unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -89,7 +88,9 @@ def _report_write_errors(stream: Any, descriptor: int) -> Any:
 
 
 def _open_closed_streams() -> None:
-    """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
+    """Open the null device in place of each closed standard stream.
+
+    Otherwise, the next opened file would get the stream's descriptor.
 
     Standard input is opened write-only, so that reading fails, as on a closed stream. Standard output is
     opened read-only, so that writing fails. Text for standard error is lost.

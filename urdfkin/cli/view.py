@@ -229,7 +229,7 @@ def _make_line(
     from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = find_conversion(robot, convention)
-    # With one seed, two random configurations would be equal.
+    # With equal seeds, a random start and a random end would be the same configuration.
     other_seed = seed + 1 if start.startswith("random") else seed
     first, last = (
         read_inputs(robot, None, own_seed, text, option=option, conversion=conversion).q

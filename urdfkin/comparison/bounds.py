@@ -49,7 +49,7 @@ RANDOM_SAMPLES = 512
 #: Number of random configurations at corners of the joint ranges.
 #: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
-#: Number of sampled configurations from which the search starts for each frame.
+#: Number of starting points of the search for one frame.
 STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
 TRIALS_PER_STEP = 13
@@ -169,7 +169,8 @@ class DistanceSearch:
         """Return poses in A's root frame.
 
         Returns:
-            Poses of A's frames, and of B's frames without `FramePair.tool`, each (n, frames, 4, 4).
+            Poses (n, frames, 4, 4) of A's frames, and poses (n, frames, 4, 4) of B's frames. The transform
+            `FramePair.tool` is removed from B's poses.
         """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -305,7 +306,7 @@ BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Bound the linear part |D + sum_i D_i x_i| of a frame's distance in each box.
+    """Bound the linear part of a frame's distance in each box: `|D + sum_i D_i x_i|`.
 
     Args:
         names: Every variable that changes the distance.
@@ -351,7 +352,7 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and the derivatives D_i (n, 3, variables) at box centers `c` (n, variables)."""
+        """Return D (n, 3) and its derivatives D_i (n, 3, variables) at the box centers `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -388,7 +389,7 @@ def tighten(
         max_boxes: Maximum number of boxes in memory.
 
     Returns:
-        A proven bound, m; `upper` if no smaller bound is proven.
+        A proven bound, m; at most `upper`.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)

@@ -74,13 +74,13 @@ class DifferenceEntry(TypedDict):
     """A difference between the two models."""
 
     place: Annotated[
-        str, doc("The joint or link that differs, for example `joint elbow`; of A, unless only B has it.")
+        str, doc("Joint or link of A, for example `joint elbow`. The name is B's if A has no such element.")
     ]
     what: Annotated[
         str, doc("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
     ]
-    a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
-    b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
+    a: Annotated[Value, doc("Value of the parameter in A; null without a value.")]
+    b: Annotated[Value, doc("Value of the parameter in B; null without a value.")]
     radians: Annotated[
         NonNegativeFloat, doc("Angular part of the difference, radians; 0 if no angle differs.")
     ]
@@ -170,7 +170,7 @@ class FrameEntry(TypedDict):
     radians_seen: Annotated[
         NonNegativeFloat, doc("Angle between the orientations at `q_a` and `q_b`, radians.")
     ]
-    q_a: Annotated[list[float], doc("Configuration of A; empty if the frame does not differ.")]
+    q_a: Annotated[list[float], doc("Configuration of A; empty without a difference.")]
     q_b: Annotated[list[float], doc("Configuration of B that corresponds to `q_a`.")]
 
 
@@ -223,7 +223,7 @@ class SameCertificate(Header):
     rounding: Rounding
     frames: Annotated[
         list[FrameEntry],
-        doc("Interval of the largest distance for each pair of matched links, after B is changed."),
+        doc("For each pair of matched links: an interval of their largest distance after the changes of B."),
     ]
     as_written: Annotated[
         FrameEntry | None,

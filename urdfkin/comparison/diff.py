@@ -127,9 +127,9 @@ class Changes:
             new joint has no entry, because its effect cannot be computed.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
-        rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
-            does not list these errors. None if both versions have the same format, or if the verdict of
-            `same` is not `UP_TO_SINGLE`. Infinite if the bound was not computed.
+        rounding: Bound on the pose errors from the single precision of USD files: a distance (m) and an angle
+            (rad). Infinite if the bound was not computed. `changes` does not list these errors. Only a
+            comparison with the verdict `UP_TO_SINGLE` has a bound; otherwise None.
     """
 
     sources: tuple[str, str]
