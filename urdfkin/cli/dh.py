@@ -23,8 +23,8 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import Answer, answer_command, report_compilation
 from urdfkin.cli.shell import complete_table
 
-#: The formats in `urdfkin.dh.export.FORMATS`, urdf and svg.
-#: The names are copied, because an import of that module would slow --help down.
+#: The formats urdf and svg, and a copy of `urdfkin.dh.export.FORMATS`.
+#: An import of that module would slow --help down.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),

@@ -67,7 +67,7 @@ class DHRequest:
     """The values of the options of `urdfkin dh`.
 
     `dh_arguments` contains the keyword arguments of `Robot.dh`. `unchanged_table` is the path of the table
-    ROBOT. An option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` sets `unchanged_table` to None.
+    ROBOT, or None if the command derives a new table.
     """
 
     robot: Robot

@@ -32,8 +32,8 @@ class Stop:
     def exit_code(self, default: int) -> int:
         """Return the exit code of a command that a signal may have stopped.
 
-        After signal n, the exit code is 128 + n, as in shells. Without a signal, it is `default`. A signal
-        does not change the exit code 1, which reports a disagreement.
+        After signal n, the exit code is 128 + n, as in shells. Without a signal, the exit code is `default`.
+        A signal does not change the exit code 1, which reports a disagreement.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
 

@@ -226,12 +226,12 @@ def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
-    For each changed joint, the command prints the frame with the largest displacement, and the largest
-    displacement in all configurations within the joint limits. If the changes only rotate frames, the command
-    prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The last line of the
-    output is the largest displacement that all changes together cause. If OLD and NEW have different formats
-    (URDF, MJCF or USD), the command prints the differences that `urdfkin same` finds. If you name more than
-    two robots, the command compares each pair.
+    For each changed joint, the command prints the frame that the joint's changes displace most. The printed
+    displacement is the largest in all configurations within the joint limits. If the changes only rotate
+    frames, the command prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The
+    last line of the output is the largest displacement by all changes together. If OLD and NEW have different
+    formats (URDF, MJCF or USD), the command prints the differences that `urdfkin same` finds. If you name
+    more than two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

@@ -456,8 +456,8 @@ REPRESENTATIONS = (
         "--nearest",
         type=NumberInRange(min=0.0),
         metavar="RAD",
-        help="The command fails if the distance (rad) of the Euler angles from their singularity is not larger"
-        " than this number.",
+        help="The command fails if the distance (rad) of the Euler angles from their singularity is at most"
+        " RAD.",
         show_default="1e-9",
     ),
 )

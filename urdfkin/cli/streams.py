@@ -186,7 +186,7 @@ class SafeStream:
             m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
         ]
         # Only the last 16 characters of a long line are stored.
-        # The "x" replaces the deleted characters, so that a later "::" is not at the start of the line.
+        # The "x" replaces the deleted characters, so that a remaining "::" is not at the start of the line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (

@@ -54,8 +54,8 @@ def study_all(
     """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
     `given` are the validated robots, and `report` is their validation report. `how` are arguments of `load`.
-    `shard` is a part of the validation, for example "1/4". A part studies only the robots with
-    their first sample in this part. An interrupt skips the remaining robots.
+    `shard` is a part of the validation, for example "1/4". A part studies only the robots with their first
+    sample in this part. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -215,8 +215,8 @@ def validate_command(
     configurations in which all joints are at their lower or upper limits. In 4 of 25 samples, joint
     velocities and accelerations are a hundred times larger than in the others.
 
-    Disagreements are in multiples of eps * scale. The number eps is 2.2e-16; scale is the size of the terms
-    in the sum of the computed number. Rounding alone causes disagreements of 1 to 10.
+    Disagreements are in multiples of eps * scale. The number eps is 2.2e-16. The number scale is the size
+    of the terms that are added to compute a value. Rounding alone causes disagreements of 1 to 10.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or a folder. In a folder, the command validates all
     .urdf files, also in subfolders, but not in hidden folders.

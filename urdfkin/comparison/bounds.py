@@ -366,7 +366,7 @@ class BoxBounds:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
 
-        The vector `point` (3,) is in the axes of `frame`.
+        `point` (3,) is the point's position in `frame`.
         """
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]

@@ -97,7 +97,7 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """Conversion of the pose T_A of a planar or floating joint in A to the pose T_B in B: T_B = M T_A N."""
+    """Conversion of a planar or floating joint's pose from A to B: `T_B = M T_A N`."""
 
     before: Annotated[TransformRows, doc("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[TransformRows, doc("Matrix N (4, 4), multiplied from the right.")]

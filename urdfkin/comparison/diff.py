@@ -37,7 +37,7 @@ from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Default values of attributes that a joint's elements may omit.
+#: Default values of attributes that the XML elements of a joint may omit.
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
@@ -56,8 +56,8 @@ class ModelChange:
 
     Attributes:
         what: Name of the attribute, for example "origin x"; empty for a new or removed element.
-        size: Size of the change, for example "38.14 mm off". Only changes of poses and axes between different
-            formats have a size; otherwise empty.
+        size: Size of the change, for example "38.14 mm off". Only some changes between different formats have
+            a size, for example changes of an axis; otherwise empty.
     """
 
     element: str
