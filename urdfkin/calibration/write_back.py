@@ -25,7 +25,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion_before_element
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals of written metres and radians: the precision of a double near 1.
+#: Written metres and radians have 15 decimals, the precision of a double near 1.
 _DECIMALS = 15
 _ROUNDING = 10.0**-_DECIMALS
 
@@ -33,11 +33,11 @@ _ROUNDING = 10.0**-_DECIMALS
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Write new joint origins into a URDF.
 
-    A number of xyz and rpy that is unchanged up to rounding keeps its digits.
+    A number in the attribute xyz or rpy keeps its digits if it changes only by rounding.
 
     Args:
         data: The original URDF.
-        origins: The new origin (4, 4) of each changed joint, by joint name.
+        origins: Dictionary from the name of each changed joint to its new origin, a (4, 4) pose.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -105,7 +105,7 @@ class UpdatedURDF:
 
     Attributes:
         robot: The robot before the change.
-        origins: The new origin (4, 4) of each changed joint, by joint name.
+        origins: Dictionary from the name of each changed joint to its new origin, a (4, 4) pose.
         certificate: Result of Pinocchio's check of the new URDF; None if not checked.
     """
 
@@ -131,7 +131,7 @@ class UpdatedURDF:
 
     @cached_property
     def displacements(self) -> dict[str, tuple[float, float]]:
-        """Change of each joint's origin, by joint name: distance (m) and angle (rad)."""
+        """Displacement of each joint's origin, by joint name, as a distance (m) and an angle (rad)."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {

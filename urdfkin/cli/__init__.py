@@ -24,7 +24,7 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Commands below each heading of the help page, each with its module in `urdfkin.cli` and its summary.
+#: Commands below each heading of the help page. Each command has a module in `urdfkin.cli` and a summary.
 #: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
 _COMPUTE_HEADING = "Compute"
 _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
@@ -47,7 +47,7 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
         "imu": ("quantity", "Compute the readings of an accelerometer and a gyroscope on a frame."),
     },
     "Tables and code": {
-        "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
+        "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare a published table with a robot."),
         "screws": (
             "paths",
             "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",
@@ -57,7 +57,7 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
         "export": ("export", "Export verified kinematics as code in C, Python, MATLAB and other languages."),
     },
     "Compare and calibrate": {
-        "same": ("models", "Prove that two robot models move alike, or bound the distance of their frames."),
+        "same": ("models", "Prove that two robot models move alike, or bound the distances of their frames."),
         "diff": (
             "models",
             "List the changes between two versions of a robot file and their effect on motion.",
@@ -115,7 +115,7 @@ def _invert_table(table: dict[str, str]) -> dict[str, str]:
 
 #: Suggested commands for words that are not commands.
 #: For example, urdfkin suggests `placement` for the word "fk".
-#: In the argument, each key is a suggested command, and its value lists the words.
+#: The dictionary below maps each suggested command to its words.
 _SYNONYMS = _invert_table(
     {
         "--help": "help usage man",
@@ -252,6 +252,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The last line of the output already states what is not verified, so this warning is hidden.
+    # The warning "not verified" is hidden, because the last line of the output repeats it.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

@@ -55,8 +55,8 @@ _FORMATS = (*TEXT_FORMATS, "json")
     "--order",
     type=click.Choice(["driver", "urdf"]),
     default="driver",
-    help="With --ur: rotation that roll, pitch and yaw in the file describe. driver: Rx(roll) Ry(pitch)"
-    " Rz(yaw). urdf: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.",
+    help="With --ur: rotation of roll, pitch and yaw in the file. driver: Rx(roll) Ry(pitch) Rz(yaw). urdf:"
+    " Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.",
 )
 @path_options
 @click.option(
@@ -88,7 +88,7 @@ _FORMATS = (*TEXT_FORMATS, "json")
     "--all",
     "write_all",
     is_flag=True,
-    help="Write all fitted parameters, not only those that changed by more than 2 sigma.",
+    help="Write all fitted parameters. By default, only changes of more than 2 sigma are written.",
 )
 @click.option("--force", is_flag=True, help="Write the calibration even if urdfkin finds it implausible.")
 @format_option(*_FORMATS, help_="Output format of the report.")
@@ -112,7 +112,7 @@ def calibrate_command(
     """Fit the parameters of ROBOT to measured poses, and write the calibrated robot to a new file.
 
     The new URDF differs from that of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at the
-    measured configurations. With --ur, the configurations of this check are random. If ROBOT is the file of a
+    measured configurations. With --ur, Pinocchio uses random configurations. If ROBOT is the file of a
     Denavit-Hartenberg table, the command fits the numbers of the table. Pinocchio checks the new table in the
     zero configuration. If neither --poses nor --ur is given, the command lists which parameters are
     identifiable in principle.
@@ -148,7 +148,7 @@ def calibrate_command(
 
     def write_answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # JSON is returned as text: `Answer` would add the entries `verified` and `check` to a mapping.
+        # JSON is returned as text, because `Answer` adds the keys `verified` and `check` to a mapping.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMATS)
         context.exit(code)
 

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Minimum time (s) between two lines about the progress.
-#: `_LINE_INTERVAL` is for lines of text, `_JSON_INTERVAL` for lines of JSON.
+#: Minimum time (s) between two progress lines of text, and between two progress lines of JSON.
 #: The last line of JSON is printed at once.
 _LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 
@@ -45,7 +44,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # The time until the last call without a new chunk is not counted: urdfkin may compile kernels.
+        # Each call before the first new chunk restarts the clock, because urdfkin may compile kernels first.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:

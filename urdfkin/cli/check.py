@@ -68,13 +68,12 @@ class CheckOutcome:
         excerpts: Excerpt of the file for each finding; None if the finding marks no text. An excerpt has the
             faulty line, and a line with carets below the fault.
         known_count: Number of findings that the baseline file suppresses.
-        obsolete_count: Number of findings that the baseline file lists, but that the checked files no longer
-            have.
+        obsolete_count: Number of findings in the baseline file that the checked files no longer have.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
         files_with_errors: Files with a reported finding of severity error. --fix does not change these files.
             A warning that --strict reports as an error does not count.
-        unwritable: Names of texts that --fix cannot write: standard input, a pipe, an expanded .xacro file,
-            and a robot of the catalogue.
+        unwritable: Names of inputs that --fix cannot change: standard input, a pipe, an expanded .xacro file,
+            or a robot of the catalogue.
     """
 
     files: list[str] = field(default_factory=list)
@@ -237,8 +236,8 @@ _SIZE_LIMIT_HELP = {
     "depth": "Largest nesting depth of XML elements.",
     "elements": "Largest number of XML elements in a file.",
     "attributes": "Largest number of attributes of an XML element.",
-    "name": "Largest number of characters in a name.",
-    "number": "Largest number of characters in a number.",
+    "name": "Largest length of a name in characters.",
+    "number": "Largest length of a number's text in characters.",
     "markup": "Largest size of a tag, comment or processing instruction in bytes.",
 }
 size_limit_options = combine(
@@ -295,7 +294,7 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard
     input. For a FOLDER, the command checks the *.urdf files in the folder and its subfolders, except hidden
     subfolders. Without FILE and FOLDER, the current folder is checked. A .xacro file is expanded in a
-    restricted process. This process can only compute and read files in certain folders, such as the .xacro
+    restricted process. The process can only compute, and read files in certain folders such as the .xacro
     file's package (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request.
     Settings are in the table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
@@ -476,8 +475,8 @@ class CheckRun:
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
         """Return whether a file and its included files are the same as in `commit_files`.
 
-        Every file of the commit with a suffix in `suffixes` counts as an included file. Return False if the
-        checked file contains the name of a file that was deleted after the commit.
+        The method assumes that the file includes every file of the commit with a suffix in `suffixes`. Return
+        False if the checked file contains the name of a file that was deleted after the commit.
         """
         if suffixes not in self._has_changes:
             self._has_changes[suffixes] = commit_files.has_changes(suffixes)

@@ -23,7 +23,7 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import Answer, answer_command, report_compilation
 from urdfkin.cli.shell import complete_table
 
-#: A copy of the formats in `urdfkin.dh.export.FORMATS`, and the formats urdf and svg.
+#: The formats urdf and svg, and a copy of `urdfkin.dh.export.FORMATS`.
 #: An import of that module would slow --help down.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
@@ -70,8 +70,8 @@ derivation_options = combine(
     _choice(
         "--near-parallel",
         ("hayati", "strict"),
-        "Parameters for nearly parallel joint axes. hayati: five, with the angle beta. strict: only four, and"
-        " offsets can become very large.",
+        "Parameters for nearly parallel joint axes. hayati: rows with five parameters, including the angle"
+        " beta. strict: rows with four parameters, which may contain very large offsets.",
     ),
     click.option(
         "--snap",
@@ -88,9 +88,8 @@ derivation_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rule for the rows of consecutive parallel axes. last: the last of these rows contains the sum of"
-        " the offsets d. first: the first row contains the sum. each: each row contains the offset of its"
-        " own link.",
+        "Rows that contain the offsets d of consecutive parallel axes. last: the last row contains their sum."
+        " first: the first row contains their sum. each: each row contains the offset of its own link.",
     ),
     click.option(
         "--flip",
@@ -101,7 +100,7 @@ derivation_options = combine(
     _choice(
         "--first",
         ("base", "joint"),
-        "Place frame 0 at the base, or at the first joint as in Craig's book, where d1 is zero.",
+        "Position of frame 0. base: at the base. joint: at the first joint as in Craig's book; d1 is zero.",
     ),
     _choice(
         "--sign",
@@ -112,8 +111,8 @@ derivation_options = combine(
     _choice(
         "--slide",
         ("drawn", "minimal"),
-        "Position of a prismatic joint's axis. drawn: as in the URDF. minimal: through the origin of the next"
-        " or previous revolute joint, so that the length a between the axes is 0.",
+        "Position of a prismatic joint's axis. drawn: the axis is as in the URDF. minimal: the axis"
+        " passes through the origin of the next or previous revolute joint, so that the length a is 0.",
     ),
     click.option(
         "--like",
@@ -203,12 +202,12 @@ def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
 
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
     .tsv, .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention.
-    With an option that affects the rows, such as --tip or --snap, the command derives a new table of the same
-    robot. See `urdfkin explain urdf-to-dh`.
+    An option that affects the rows, such as --tip or --snap, makes the command derive a new table. See
+    `urdfkin explain urdf-to-dh`.
 
-    Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, the compared table differs, or the
-    table agrees only because the fitted base, tool and joint offsets hide a mistake. 2: bad input. 3: not
-    checked, or the rounding error of a strict table is larger than that of the robot.
+    Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, the compared table differs, or its
+    fitted base, tool and joint offsets hide a mistake. 2: bad input. 3: not checked, or the rounding error of
+    a strict table is larger than that of the robot.
     """
     from urdfkin.cli.dh_tables import DHRequest, make_dh_answer
     from urdfkin.dh.parse_table import is_table_file

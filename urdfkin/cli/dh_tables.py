@@ -66,9 +66,8 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `dh_arguments` contains the values that are passed to `Robot.dh` as keyword arguments. `unchanged_table`
-    is the table file ROBOT if no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given. Otherwise,
-    `unchanged_table` is None.
+    `dh_arguments` contains the keyword arguments of `Robot.dh`. `unchanged_table` is the path of the table
+    ROBOT, or None if the command derives a new table.
     """
 
     robot: Robot
@@ -152,7 +151,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged_table is not None:
         table = read_table_or_screws(expand_home(request.unchanged_table))
-        # If the file contains screws, the call of `Robot.dh` below derives a table.
+        # For screws, the rest of this function derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None

@@ -32,8 +32,8 @@ class Stop:
     def exit_code(self, default: int) -> int:
         """Return the exit code of a command that a signal may have stopped.
 
-        `default` is the exit code without a signal. After signal n, the exit code is 128 + n, as in shells.
-        The exit code 1 reports a disagreement. If `default` is 1, a signal does not change the exit code.
+        After signal n, the exit code is 128 + n, as in shells. Without a signal, the exit code is `default`.
+        A signal does not change the exit code 1, which reports a disagreement.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
 

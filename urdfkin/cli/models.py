@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck itself.
-#: With --recheck, the other options of this tuple are errors.
+#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck.
+#: --recheck cannot be combined with the other options of this tuple.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
-#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
-#: `urdfkin diff` rejects a revision, unless a file has this name.
+#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf. `urdfkin diff` rejects revisions.
+#: A file with such a name is accepted.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 
@@ -73,8 +73,8 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes (parts of the joint space) that the search for sharper upper bounds keeps"
-    " in memory; 0: no search.",
+    help="Maximum number of boxes (parts of the joint space) in memory during the search for sharper upper"
+    " bounds. 0: no search.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
@@ -126,8 +126,8 @@ def same_command(
     configuration in which the distance is at least the lower bound. The upper bound is proven for all
     configurations within the joint limits.
 
-    The numbers of a USD file are rounded to single precision. If this rounding explains the difference of
-    each joint, A and B are the same up to single precision.
+    The numbers of a USD file are rounded to single precision. If these rounding errors explain the
+    difference of every joint, A and B are the same up to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
     1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are
@@ -226,13 +226,12 @@ def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
-    For each changed joint, the command prints the frame that the changes of this joint move farthest. The
-    command also prints this frame's largest displacement in all configurations within the joint limits. If
-    the changes only rotate frames, the command prints the largest rotation. OLD and NEW have the same joint
-    coordinates in each configuration. The last line of the output states how far all changes together move
-    the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the
-    changes are the differences that `urdfkin same` finds. If you name more than two robots, the command
-    compares each pair.
+    For each changed joint, the command prints the frame that the joint's changes displace most. The printed
+    displacement is the largest in all configurations within the joint limits. If the changes only rotate
+    frames, the command prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The
+    last line of the output is the largest displacement by all changes together. If OLD and NEW have different
+    formats (URDF, MJCF or USD), the command prints the differences that `urdfkin same` finds. If you name
+    more than two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
@@ -289,7 +288,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 @seed_option
 @answer_command()
 def readers_command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
-    """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
+    """Compare how other libraries read ROBOT: the joints, the joint order, and the poses of all links.
 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
     Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each

@@ -128,7 +128,7 @@ _LOAD_OPTIONS_KEY = "urdfkin.load_options"
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
     """Return a callback that stores an option's value for `load_options`.
 
-    If `always` is true, the callback stores a value even if the user does not give the option.
+    With `always`, the callback also stores the value of an option that the user omits.
     """
 
     def store_option(context: click.Context, _: click.Parameter, value: Any) -> None:
@@ -216,16 +216,16 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be the name of a pose, such as ready. This pose then gives"
-        " the value of each fixed joint for which --lock has no value.",
+        " With --joints, the first --lock may be the name of a pose, such as ready. The pose then sets each"
+        " fixed joint that has no --lock value.",
     ),
     click.option(
         "--joints",
         metavar="NAMES",
         expose_value=False,
         callback=_store_as("joints", lambda words: [name.strip() for name in words.split(",")]),
-        help="Keep only these joints, separated by commas. Each other joint is fixed at its value in --lock,"
-        " or at 0 without a value.",
+        help="Keep only these joints, separated by commas. All other joints are fixed at their --lock values."
+        " A joint without a --lock value is fixed at 0.",
     ),
 )
 robot_argument = combine(
@@ -363,7 +363,7 @@ def locked_line(robot: Robot) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """A robot, a frame and the values to compute with.
+    """Inputs of a computation: a robot, a frame, configurations and motions.
 
     Attributes:
         q: (n, n_q) configurations, rad or m.
@@ -431,7 +431,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def disabled_options(source: str) -> dict[str, Any]:
-        """Disable the xacro options if only other sources are xacro files; the same for USD options."""
+        """Disable the options for xacro and USD files that apply only to another source."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -455,8 +455,8 @@ def read_inputs(
 ) -> Inputs:
     """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    If one of the arrays has several samples, single samples of the other arrays are repeated. `option` is the
-    option that gives q. If `option` is not --q, the caller must reject an unused --seed.
+    A single sample of q, v or a is repeated for all samples of the other arrays. `option` is the option that
+    gives q. If `option` is not --q, the caller must reject an unused --seed.
     """
     import numpy as np
 
@@ -474,7 +474,7 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat each array with one row to the length of the longest array; reject other lengths."""
+    """Repeat arrays with one row up to the length of the longest array."""
     import numpy as np
 
     n = max(map(len, batches))
@@ -482,7 +482,7 @@ def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArr
         raise InputError(
             problem,
             found=", ".join(str(len(batch)) for batch in batches),
-            remedy="give one sample, or the same number of samples, for each of them",
+            remedy="give each batch one sample or the same number of samples",
         )
     return [np.ascontiguousarray(np.broadcast_to(batch, (n, *batch.shape[1:]))) for batch in batches]
 
@@ -521,8 +521,8 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample per line.
 
-    Return the samples, and the layout that fits the number of columns. A layout is a list of column names.
-    `units` is as in `read_columns`.
+    A layout is a list of column names. Return the samples, and the layout with as many names as the file has
+    columns. `units` is as in `read_columns`.
     """
     import numpy as np
 

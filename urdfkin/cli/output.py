@@ -38,7 +38,7 @@ _SUFFIXES = {
 }  # fmt: skip
 _F = TypeVar("_F", bound=Callable[..., Any])
 #: Maximum number of characters in a line of a table.
-#: All cells of a column have the same width, so one long name could fill the memory.
+#: Cells are padded to the widest cell of their column, so one very long name could fill the memory.
 _MAX_WIDTH = 10_000
 
 
@@ -60,13 +60,12 @@ class Answer:
     """The result of a command.
 
     Attributes:
-        document: Function that returns a document with texts and tables, for the formats in `TEXT_FORMATS`.
+        document: Function that returns the texts and tables for the formats in `TEXT_FORMATS`.
         data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
             array for npy, or the output as text. A function for a format in `TEXT_FORMATS` replaces
             `document` in this format.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
-        fit_document: Function that returns a document that fits the width of a terminal. None: use
-            `document`.
+        fit_document: Function that returns a document for the width of a terminal; None to use `document`.
     """
 
     document: Callable[[], TextDocument]
@@ -83,10 +82,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the output in the format `form`.
-
-        Also return True if the output already contains the line `check`, and False otherwise.
-        """
+        """Return the output in the format `form`, and whether the output already contains `check`."""
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -189,7 +185,7 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if `write_file` cannot write an output file.
 
-    A full disk is found only by `write_file`.
+    This check does not detect a full disk; `write_file` does.
     """
     for path in filter(None, paths):
         try:
@@ -222,7 +218,7 @@ def certificate_exit_code(certificate: Certificate) -> int:
 
 
 def format_pinocchio_check(check: object | None) -> tuple[str, int]:
-    """Return the line that states the result of Pinocchio's check, and the exit code of the command.
+    """Return a line with the result of Pinocchio's check, and the command's exit code.
 
     `check` is the result of the check, or None if nothing was checked.
     """

@@ -52,10 +52,11 @@ def chain_command(
     """List the joints on the path between two frames (section 7.5), with their axes in one configuration.
 
     For each joint, the table has the axis z, the origin O, and the vector d to the origin of the next joint.
-    All vectors are in the axes of the base; O and d are in metres. The last vector d leads to the tip. The
-    path may pass a joint from its child link to its parent link. Such a joint is marked "backwards". The axis
-    of such a joint is reversed, so that the joint's coordinate has the same sign as in the URDF. The table
-    does not list fixed joints. The offset of a fixed joint is a part of a vector d. The option --q gives the
+    All vectors are in the axes of the base; O and d are in metres. The last vector d leads to the tip.
+
+    The mark "backwards" means that the path leads from a joint's child link to its parent link. The axis z of
+    a backwards joint is reversed, so that its coordinate has the same sign as in the URDF. The table does not
+    list fixed joints. The offset of a fixed joint is a part of a vector d. The option --q gives the
     configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
@@ -174,9 +175,9 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     "--opw",
     type=FiniteNumber(),
     metavar="MM",
-    help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if a"
-    " coordinate of the tip's position is wrong by more than MM millimetres, or an entry of the tip's"
-    " rotation matrix by more than MM / 1000.",
+    help="Print the parameters of an OPW solver as YAML, instead of the structure. MM is the largest allowed"
+    " error of the tip's coordinates in millimetres. MM / 1000 is the largest allowed error of the entries of"
+    " the tip's rotation matrix.",
 )
 @verify_option
 @answer_command(*TEXT_FORMATS, "json")

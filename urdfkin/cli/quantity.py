@@ -1,6 +1,6 @@
 """Define the commands that compute a quantity of a frame, such as `urdfkin jacobian` and `urdfkin placement`.
 
-`make_command` makes the command of a quantity in `verify/quantities.py`.
+`make_command` uses the quantities in `verify/quantities.py`.
 """
 
 from __future__ import annotations
@@ -255,8 +255,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Possible headings of the first column of CSV output.
-#: The heading is "t" if the samples have times, otherwise "sample".
+#: Heading of the first column of CSV output, for samples without and with times.
 _SAMPLE_HEADINGS = ("sample", "t")
 
 
@@ -364,7 +363,7 @@ _POSE_FORMS = {
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
 @quantity_options(
     PLACEMENT.inputs,
-    frame_name_option("--relative-to", "Link or joint in whose frame the pose is expressed.", "the world"),
+    frame_name_option("--relative-to", "Link or joint that is the reference frame of the pose.", "the world"),
     click.option(
         "--as",
         "form",
@@ -457,18 +456,17 @@ REPRESENTATIONS = (
         "--nearest",
         type=NumberInRange(min=0.0),
         metavar="RAD",
-        help="The command fails if the Euler angles are at this distance (rad) or less from their"
-        " representational singularity.",
+        help="The command fails if the distance (rad) of the Euler angles from their singularity is at most"
+        " RAD.",
         show_default="1e-9",
     ),
 )
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    The table has one row for each entry of v, for example for each joint velocity. The row lists the time
-    derivatives of the frame's position and orientation (Euler angles or a quaternion). The row assumes that
-    this one entry of v is 1, and that all other entries of v are 0. `urdfkin jacobian` prints angular
-    velocities instead.
+    Each row contains the derivatives of the position and the orientation (Euler angles or a quaternion) with
+    respect to time. For row i, entry i of v is 1, and all other entries of v are 0. `urdfkin jacobian` prints
+    angular velocities instead.
     """
     from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 
@@ -512,9 +510,9 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     accelerometer at rest reads 9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
 
     The input is a configuration --q, joint velocities --v and joint accelerations --a. The input may also be
-    a batch of configurations, or a --trajectory. The motion of the root link is given by --base-velocity and
-    the other --base options, or by arrays in the .npz file. With --root-joint floating, the pose of the root
-    link is part of --q. See `urdfkin explain gravity-in-an-acceleration`.
+    a batch of configurations, or a --trajectory. --base-velocity and the other --base options set the motion
+    of the root link. An .npz file may also contain this motion. With --root-joint floating, the pose of the
+    root link is part of --q. See `urdfkin explain gravity-in-an-acceleration`.
     """
     from urdfkin.robot.trajectory import parse_numbers
 
@@ -547,8 +545,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
     rounding errors of the decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of
-    the singular values. The command also computes the derivative of the manipulability with respect to each
-    joint. This derivative is computed from the frame's Hessian.
+    the singular values. The command also computes the manipulability's derivative with respect to each joint,
+    from the frame's Hessian.
 
     At a singularity, the command prints the rank, the lost directions, and the joints that cause the
     singularity. The manipulability may have no derivative at a singularity. CSV then contains nan, and JSON
@@ -619,7 +617,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _values_with_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield name and [value, lower bound, upper bound] of each quantity of sample `k`."""
+    """Yield each quantity of sample `k`: its name and the list [value, lower bound, upper bound]."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     yield "condition", [float(side[k]) for side in found.condition]

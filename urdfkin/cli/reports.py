@@ -53,7 +53,7 @@ report_options = combine(
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
     """Write a report in the requested formats, and return an exit code.
 
-    If a file cannot be written, the exit code is that of the first such error. Otherwise, the exit code is 0.
+    The exit code is that of the first write error, or 0 if all files are written.
     """
     codes = [
         _write(document, name, path) for name in REPORT_FILE_OPTIONS if (path := files[name]) is not None
@@ -164,8 +164,8 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
     "--factor",
     type=NumberInRange(1.0),
     default=2.0,
-    help="Report a regression if a quantity's largest disagreement, or its largest ratio to its bound, grows"
-    " by more than this factor.",
+    help="Report a regression if a quantity's largest disagreement grows by more than this factor. The factor"
+    " also limits the growth of the largest ratio to the bound.",
 )
 @markdown_option
 @answer_command(*TEXT_FORMATS, "json")

@@ -34,8 +34,8 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 def robots_command(family: str | None) -> Answer:
     """List the robots of the catalogue, which every command loads by name.
 
-    The catalogue contains the URDF files of the package example-robot-data and of urdfkin. The base and the
-    tip in this list are the defaults of the options --base, --tip and --frame.
+    The catalogue contains the URDF files of the package example-robot-data and of urdfkin. The columns base
+    and tip show the default frames of the options --base, --tip and --frame.
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
@@ -78,10 +78,10 @@ def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
     The joints have the same order as in q, in v and in the columns of a Jacobian. Pinocchio uses the same
-    order of the joints. The last line compares this order with the order of the joints in the file. Limits
-    are in rad and rad/s, for prismatic joints in m and m/s. The first link is the root. If a link has several
-    children, a branch of the drawn tree leads to each child. A link without a branch is the only child of the
-    link above it.
+    order of the joints. The last line reports whether the file lists the joints in another order. Limits are
+    in rad and rad/s; those of prismatic joints are in m and m/s. The first link is the root. If a link has
+    several children, a branch of the drawn tree leads to each child. A link without a branch is the only
+    child of the link above it.
     """
     loaded = load_robot(robot)
     data = {
@@ -132,8 +132,8 @@ def order_command(robot: str, start: str | None, end: str | None) -> Answer:
 
     For each joint and tool, the table contains the joint's index in q. If the joint's index in v differs, the
     table contains both indices: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With
-    --from or --to, the command prints Python code that converts q and v. NAME is a tool from the table; FILE
-    is a TOML file with your own order, signs, units and motor zeros (docs/conventions.md).
+    --from or --to, the command prints Python code that converts q and v. NAME is a tool in the table. FILE
+    is a TOML file that defines your own order, signs, units and motor zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
@@ -173,7 +173,7 @@ def _orders(robot: Robot) -> Answer:
 def _index_cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return the indices of each joint as text, for example "7", "7-13", or "-" for none.
 
-    "7/6" means index 7 in q and index 6 in v. Otherwise, the indices in q and v are equal.
+    "7/6" means index 7 in q and index 6 in v. A text without "/" applies to both q and v.
     """
     indices = conversion.q_and_v_indices
 
@@ -219,7 +219,7 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
             old, new, star = (
                 ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
             )
-            yield f"# {letter}: this conversion needs more than a new order, factors and zeros. Use urdfkin:"
+            yield f"# {letter}: indexing, factors and zeros cannot express this conversion. Use urdfkin:"
             yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

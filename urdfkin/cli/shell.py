@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 #: Pattern of the names that completion offers.
 #: These names contain no character that a shell interprets.
-#: Bash separates words at colons, so names with colons do not match.
+#: The pattern also excludes colons, because Bash separates words at colons.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
 _MAX_BYTES = 10_000_000
@@ -123,9 +123,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 def warm_command() -> None:
     """Compile all kernels (machine code) and store them, for container images and CI.
 
-    Without this command, urdfkin compiles a kernel when computations without the kernel take too long, for
-    example for a large batch. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.
-    On another processor, the kernels are compiled again.
+    Without this command, urdfkin compiles a kernel only if computations take too long, for example large
+    batches. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME. On another
+    processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """

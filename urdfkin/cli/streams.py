@@ -1,8 +1,7 @@
 """Write to the standard streams without tracebacks, and escape control characters in names.
 
-Standard output may be closed, a file on a full disk, or a pipe to a program that exits early. The
-encoding of standard output may not support every character of a joint's name. In each of these cases, the
-command ends without a traceback.
+A command ends without a traceback if standard output is closed, if the disk is full, or if the reader of a
+pipe exits early. The same applies if the encoding does not support a character of a joint's name.
 
 `wrap_streams` wraps standard output and standard error in a `SafeStream`, which escapes control characters
 and commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of
@@ -34,8 +33,7 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Commands print their own line about joint values that look like degrees.
-    # Therefore, DegreesWarning is hidden.
+    # DegreesWarning is hidden, because each command itself reports joint values that look like degrees.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -73,7 +71,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _report_write_errors(stream: Any, descriptor: int) -> Any:
-    """Return a standard stream that reports write errors; return any other stream unchanged."""
+    """Wrap a standard stream, so that it reports write errors. Other streams are returned unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -90,7 +88,9 @@ def _report_write_errors(stream: Any, descriptor: int) -> Any:
 
 
 def _open_closed_streams() -> None:
-    """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
+    """Open the null device in place of each closed standard stream.
+
+    Otherwise, the next opened file would get the stream's descriptor.
 
     Standard input is opened write-only, so that reading fails, as on a closed stream. Standard output is
     opened read-only, so that writing fails. Text for standard error is lost.
@@ -117,9 +117,8 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum number of stored characters of an unfinished line.
-#: A longer line is stored only in part.
-#: The line is needed because a CI command may be written in several pieces.
+#: Maximum number of stored characters of an unfinished line. A longer line is stored only in part.
+#: The stream stores unfinished lines because a CI command may be written in several pieces.
 _MAX_STORED = 64
 
 
@@ -172,7 +171,7 @@ class SafeStream:
         self.stream.write(text)
 
     def _escape_commands(self, text: str) -> str:
-        """Escape CI commands in `text`; an earlier call may have written the beginning of a command."""
+        """Escape CI commands in `text`. A command may begin in the text of an earlier call."""
         first, *rest = text.split("\n")
         lines = [self._escape_commands_in_line(first)]
         for line in rest:
@@ -187,8 +186,7 @@ class SafeStream:
             m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
         ]
         # Only the last 16 characters of a long line are stored.
-        # An "x" in front of the characters stands for the rest of the line.
-        # Without the "x", "::" in the characters could look like the beginning of the line.
+        # The "x" replaces the deleted characters, so that a remaining "::" is not at the start of the line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (

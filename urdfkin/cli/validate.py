@@ -54,8 +54,8 @@ def study_all(
     """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
     `given` are the validated robots, and `report` is their validation report. `how` are arguments of `load`.
-    `shard` is a part of the validation, for example "1/4". With `shard`, a robot is studied only if the
-    robot's first sample belongs to the given part. An interrupt skips the remaining robots.
+    `shard` is a part of the validation, for example "1/4". A part studies only the robots with their first
+    sample in this part. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -105,9 +105,9 @@ def _open_results(
 def _study_accuracy(
     source: Robot | str, settings: StudySettings, sha256: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
-    """Return the accuracy result of a robot, and whether to store this result.
+    """Return the accuracy result of a robot, and true if the result may be stored.
 
-    A failure is stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
+    A failure may be stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
     """
     import numpy as np
 
@@ -215,8 +215,8 @@ def validate_command(
     configurations in which all joints are at their lower or upper limits. In 4 of 25 samples, joint
     velocities and accelerations are a hundred times larger than in the others.
 
-    Disagreements are in multiples of eps * scale. Here eps is 2.2e-16, and scale is the size of the terms
-    that are added to compute the number. Rounding alone gives 1 to 10.
+    Disagreements are in multiples of eps * scale. The number eps is 2.2e-16. The number scale is the size
+    of the terms that are added to compute a value. Rounding alone causes disagreements of 1 to 10.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or a folder. In a folder, the command validates all
     .urdf files, also in subfolders, but not in hidden folders.

@@ -58,8 +58,8 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     "--factor",
     type=NumberInRange(min=0, min_open=True),
     default=1.0,
-    help="Multiply the error bound by this factor. A function with more rounding operations than urdfkin's"
-    " recursion may need a factor above 1.",
+    help="Multiply the error bound by this factor. Use a factor above 1 if the function rounds more often"
+    " than urdfkin's recursion.",
 )
 @click.option(
     "--batch", is_flag=True, help="Call the function with n configurations at once: q is an array (n, nq)."
@@ -188,7 +188,10 @@ def _find_quantity(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return the function FILE.py:FUNCTION, or all functions of FILE.py that are named after quantities."""
+    """Return the functions to verify, by name.
+
+    The target FILE.py selects all functions of the file that are named after a quantity.
+    """
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(

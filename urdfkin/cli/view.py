@@ -79,8 +79,8 @@ def view_command(
     of q accepts and shows values in that convention.
 
     The printed address ends with a secret key. Open the whole address, including the key. Show the address
-    only to people who may see and move the robot. Other web pages and other users of this machine
-    have no access.
+    only to people who may see and move the robot. Without the key, other web pages and other users of the
+    machine cannot use the viewer.
     """
     from urdfkin.view.server import has_screen, new_server, open_page
     from urdfkin.view.viewer import Viewer
@@ -148,7 +148,7 @@ PANELS = (
     "--to",
     "end",
     metavar="VALUES",
-    help="End of a straight line in joint space, which is plotted; the format is the same as for --q.",
+    help="Plot a straight line in joint space that ends at VALUES. The format is the same as for --q.",
 )
 @click.option(
     "--duration",
@@ -193,9 +193,10 @@ def plot_command(
 
     The plot has panels for q, v and a with their limits, and for the frame's position, velocity and
     acceleration. Other panels show the parts of the acceleration, the singular values, and the result of the
-    check. --trajectory reads a CSV or .npz file. --to makes a straight line in joint space that begins and
-    ends at rest. A floating base moves along a screw. With --convention, the file and the values of --from
-    and --to are in that convention. The panels always show the joint values of the URDF, in rad and m.
+    check. --trajectory reads a CSV or .npz file. With --to, the robot moves along a straight line in joint
+    space, and is at rest at both ends. A floating base moves along a screw. With --convention, the file and
+    the values of --from and --to are in that convention. The panels always show the joint values of the URDF,
+    in rad and m.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -228,7 +229,7 @@ def _make_line(
     from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = find_conversion(robot, convention)
-    # With one seed, two random configurations would be equal.
+    # With equal seeds, a random start and a random end would be the same configuration.
     other_seed = seed + 1 if start.startswith("random") else seed
     first, last = (
         read_inputs(robot, None, own_seed, text, option=option, conversion=conversion).q

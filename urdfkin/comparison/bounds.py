@@ -5,8 +5,8 @@ coordinate at a time. The largest distance found is a lower bound of the true la
 
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
 between the models. Each term is the largest effect of one difference over all configurations. If the models
-differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. For
-this, `tighten` divides the ranges of the variables into boxes, and bounds the distance in each box.
+differ in many places, the sum is far above the largest distance. `tighten` divides the ranges of the
+variables into boxes, and bounds the distance in each box. The largest of these bounds is sharper.
 
     D(q) = p_B - p_A              difference of the frame's positions in B and A
     D_i                           derivative of D with respect to variable i
@@ -49,7 +49,7 @@ RANDOM_SAMPLES = 512
 #: Number of random configurations at corners of the joint ranges.
 #: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
-#: Number of sampled configurations from which the search starts for each frame.
+#: Number of starting points of the search for one frame.
 STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
 TRIALS_PER_STEP = 13
@@ -84,7 +84,7 @@ class DistanceSearch:
         self.rng = np.random.default_rng(seed)
         #: (4, 4) pose of B's base link in A's root frame, for A's zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: For A and for B: whether the base link and the root link belong to the same rigid body.
+        #: Whether each model's base link belongs to the same rigid body as its root link.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
@@ -138,7 +138,8 @@ class DistanceSearch:
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
         """Check whether two configurations correspond.
 
-        Each variable must be within its search range `ends`. A's planar and floating joints must be neutral.
+        Each variable must be within its search range `ends`. The planar and floating joints of A must be in
+        their neutral configurations.
 
         Args:
             q_a: (1, nq) configuration of A.
@@ -168,7 +169,8 @@ class DistanceSearch:
         """Return poses in A's root frame.
 
         Returns:
-            Poses of A's frames, and of B's frames without `FramePair.tool`, each (n, frames, 4, 4).
+            Poses (n, frames, 4, 4) of A's frames, and poses (n, frames, 4, 4) of B's frames. The transform
+            `FramePair.tool` is removed from B's poses.
         """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -202,7 +204,7 @@ class DistanceSearch:
         """Return distances at the values nearest to zero, at corners, and at random values.
 
         Returns:
-            (n, frames) distances, m, and (n, variables) values of the variables.
+            Distances (n, frames) in m, and values (n, variables) of the variables.
         """
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
@@ -255,9 +257,10 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (frames, starting points, trials), m, of frame k at the values `z[k]`.
+        """Return the distances (frames, starting points, trials), m.
 
-        `z`: (frames, starting points, trials, variables)
+        For frame k, the variables have the values `z[k]`. The shape of `z` is (frames, starting points,
+        trials, variables).
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -298,12 +301,12 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 #: With this number of boxes, `tighten` takes one or two seconds per frame.
 MAX_BOXES = 2**17
 #: Number of boxes in one batch. The Jacobians take 48 bytes for each box and coordinate.
-#: Without batches, the 2^22 boxes of `recheck` would therefore take gigabytes.
+#: The 2^22 boxes of `recheck` would take gigabytes in one batch.
 BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Bound the linear part |D + sum_i D_i x_i| of a frame's distance in each box.
+    """Bound the linear part of a frame's distance in each box: `|D + sum_i D_i x_i|`.
 
     Args:
         names: Every variable that changes the distance.
@@ -320,7 +323,7 @@ class BoxBounds:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: For each robot, derivatives (nv, variables) of the coordinates with respect to the variables.
+        #: Derivatives of each robot's coordinates with respect to the variables: two (nv, variables) arrays.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
@@ -349,7 +352,7 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and the derivatives D_i (n, 3, variables) at box centers `c` (n, variables)."""
+        """Return D (n, 3) and its derivatives D_i (n, 3, variables) at the box centers `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -361,7 +364,10 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a `point` (3,) given in `frame`."""
+        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
+
+        `point` (3,) is the point's position in `frame`.
+        """
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not point.any():
@@ -376,20 +382,20 @@ def tighten(
     """Try to prove a smaller upper bound on a frame's distance.
 
     Args:
-        search: Search between the same two models.
+        search: Search for the distances between the two models.
         frame: The frame.
         target: Bound at which the proof ends, m.
         upper: A proven bound, m.
         max_boxes: Maximum number of boxes in memory.
 
     Returns:
-        A proven bound, m; `upper` if no smaller bound is proven.
+        A proven bound, m; at most `upper`.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     moving_pairs = [pair for pair in pairs if pair is not None]
-    # An unlimited revolute joint repeats its poses after one turn.
-    # Boxes cover an unlimited range only for revolute joints with the multiplier 1 or -1.
+    # A revolute joint with the multiplier 1 or -1 repeats its poses after one turn of its variable.
+    # Boxes over one turn therefore cover an unlimited variable, but only of such joints.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, moving_pairs, strict=False)
@@ -426,7 +432,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return the number of halvings until (1/2) sum_ij M_ij h_i h_j < `upper`; each halves one h_i."""
+    """Count the halvings of one h_i at a time until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

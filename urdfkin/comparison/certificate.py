@@ -41,8 +41,7 @@ from urdfkin.verify.oracles import PINOCCHIO, package_versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative tolerance of the numbers in a certificate.
-#: For numbers near zero, the tolerance is absolute (m or rad).
+#: Relative tolerance of the numbers in a certificate, and absolute tolerance (m or rad) near zero.
 #: The tolerances allow for different rounding errors on the machine that wrote the certificate.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: The relative tolerance of a bound is this number times the machine epsilon.
@@ -65,7 +64,7 @@ class CertifiedRule(TypedDict):
 
     mimicked_joint: Annotated[str, doc("Name of the mimicked joint.")]
     multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
-    offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
+    offset: Annotated[float, doc("Number that is added to multiplier * (mimicked value), rad or m.")]
 
 
 Value = str | float | list[str | float | None] | CertifiedRule | None
@@ -75,18 +74,18 @@ class DifferenceEntry(TypedDict):
     """A difference between the two models."""
 
     place: Annotated[
-        str, doc("The joint or link that differs, for example `joint elbow`; of A, unless only B has it.")
+        str, doc("Joint or link of A, for example `joint elbow`. The name is B's if A has no such element.")
     ]
     what: Annotated[
         str, doc("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
     ]
-    a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
-    b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
+    a: Annotated[Value, doc("Value of the parameter in A; null without a value.")]
+    b: Annotated[Value, doc("Value of the parameter in B; null without a value.")]
     radians: Annotated[
-        NonNegativeFloat, doc("Angular part of the difference, radians; 0 without an angular part.")
+        NonNegativeFloat, doc("Angular part of the difference, radians; 0 if no angle differs.")
     ]
     metres: Annotated[
-        NonNegativeFloat, doc("Linear part of the difference, metres; 0 without a linear part.")
+        NonNegativeFloat, doc("Linear part of the difference, metres; 0 if no distance differs.")
     ]
     detail: Annotated[
         Literal["", "alone", "converted"],
@@ -98,15 +97,15 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """Pose of a planar or floating joint in B: before * (pose in A) * behind."""
+    """Conversion of a planar or floating joint's pose from A to B: `T_B = M T_A N`."""
 
     before: Annotated[TransformRows, doc("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[TransformRows, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
         doc(
-            "Whether the formula contains the inverse of the pose in A. The inverse is needed if the joint's"
-            " parent link in A corresponds to the joint's child link in B."
+            "Whether the formula contains the inverse of the pose in A. It does if the joint's parent link in"
+            " A corresponds to the joint's child link in B."
         ),
     ]
 
@@ -135,7 +134,7 @@ class ToolEntry(TypedDict):
 class Rounding(TypedDict):
     """Largest distance and angle that `same` treats as rounding errors.
 
-    The distance holds while planar, floating and unlimited prismatic joints travel at most 10 m.
+    `metres` assumes that planar, floating and unlimited prismatic joints travel at most 10 m.
     """
 
     metres: NonNegativeFloat
@@ -150,28 +149,28 @@ class FrameEntry(TypedDict):
     lower: Annotated[
         NonNegativeFloat,
         doc(
-            "Lower bound of the largest distance, metres: the computed distance if A is at `q_a` and B is at"
-            " `q_b`, minus the largest rounding error."
+            "Lower bound of the largest distance, metres: the computed distance at `q_a` and `q_b`, minus the"
+            " largest rounding error."
         ),
     ]
     upper: Annotated[
         NonNegativeFloat | None,
         doc(
-            "Proven upper bound of the distance in all configurations within limits, metres; null if none is"
-            " proven."
+            "Proven upper bound of the distance, metres; null without a proof. The bound holds in all"
+            " configurations within limits."
         ),
     ]
     radians: Annotated[
         NonNegativeFloat | None,
         doc(
-            "Proven upper bound of the angle in all configurations within limits, radians; null if none is"
-            " proven."
+            "Proven upper bound of the angle, radians; null without a proof. The bound holds in all"
+            " configurations within limits."
         ),
     ]
     radians_seen: Annotated[
         NonNegativeFloat, doc("Angle between the orientations at `q_a` and `q_b`, radians.")
     ]
-    q_a: Annotated[list[float], doc("Configuration of A; empty if the frame does not differ.")]
+    q_a: Annotated[list[float], doc("Configuration of A; empty without a difference.")]
     q_b: Annotated[list[float], doc("Configuration of B that corresponds to `q_a`.")]
 
 
@@ -182,7 +181,7 @@ class Confirmed(TypedDict):
     by: Annotated[str, doc("Name and version of the oracle; empty if the oracle did not check the bounds.")]
     configurations: Annotated[Count, doc("Number of configurations at which the oracle checked the bounds.")]
     metres: Annotated[NonNegativeFloat, doc("Largest distance that the oracle computed, metres.")]
-    reason: Annotated[str, doc("Reason why the oracle computed no distances; empty if it computed them.")]
+    reason: Annotated[str, doc("Reason why the oracle computed no distances, or empty.")]
 
 
 class SameCertificate(Header):
@@ -197,7 +196,7 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. Differences without matched joints or links"
+            "Differences, in order from the base to the tips. Unmatched joints and links on different joints"
             " come last."
         ),
     ]
@@ -206,11 +205,11 @@ class SameCertificate(Header):
         doc("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
     joints: Annotated[list[CertifiedJoint], doc("Matched pairs of a joint of A and a joint of B.")]
-    links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Pairs of a link of A and a link of B.")]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Matched links: one of A and one of B.")]
     tools: Annotated[
         list[ToolEntry],
         doc(
-            "Pairs of matched links with different poses on matching rigid bodies. `same` reports the links"
+            "Matched links that have different poses on their matching rigid bodies. `same` reports the links"
             " of a pair as different tools."
         ),
     ]
@@ -219,18 +218,18 @@ class SameCertificate(Header):
     ]
     base: Annotated[TransformRows, doc("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), doc("Poses are compared relative to these links of A and B.")
+        list[str], of_length(2), doc("Links of A and B that serve as reference frames of the poses.")
     ]
     rounding: Rounding
     frames: Annotated[
         list[FrameEntry],
-        doc("Interval of the largest distance for each pair of matched links, after B is changed."),
+        doc("For each pair of matched links: an interval of their largest distance after the changes of B."),
     ]
     as_written: Annotated[
         FrameEntry | None,
         doc(
             "The frame with the largest distance between the unchanged models, and an interval of this"
-            " distance; null if B needs no changes, or if no frames can be compared."
+            " distance. The entry is null if B needs no changes. It is also null without common frames."
         ),
     ]
     checked: Confirmed
@@ -280,8 +279,8 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` also matches the
-    joints as `same` does without `map`. The verdict of this second comparison must also be "differs".
+    `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` makes a second
+    comparison, in which `same` matches the joints. The second verdict must also be "differs".
 
     Returns:
         A line for each statement that is wrong or not proven.
@@ -441,7 +440,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Compare two entries up to rounding; `zero` is the tolerance of numbers near zero."""
+    """Compare two entries up to rounding. `zero` is the absolute tolerance."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -491,7 +490,10 @@ def _interval_errors(
     *,
     use_branch_and_bound: bool,
 ) -> Iterator[str]:
-    """Yield an error for each wrong or unproven bound; `rounding` is a distance (m) and an angle (rad)."""
+    """Yield an error for each wrong or unproven bound.
+
+    `rounding` contains the largest rounding errors of a distance (m) and an angle (rad).
+    """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)

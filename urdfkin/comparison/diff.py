@@ -37,14 +37,14 @@ from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Default values of joint attributes: for every joint, for a joint with an axis, and for a mimic joint.
+#: Default values of attributes that the XML elements of a joint may omit.
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Values of `ModelChange.what` for changes that move a link.
-#: Only changes between files of different formats have these values.
+#: The values occur only if the files have different formats.
 _MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -56,8 +56,8 @@ class ModelChange:
 
     Attributes:
         what: Name of the attribute, for example "origin x"; empty for a new or removed element.
-        size: Size of the change, for example "38.14 mm off". Empty for versions of the same format, and for
-            changes of values such as limits.
+        size: Size of the change, for example "38.14 mm off". Only some changes between different formats have
+            a size, for example changes of an axis; otherwise empty.
     """
 
     element: str
@@ -121,16 +121,15 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes. If both versions have the same format: first a change of the robot's name, then
+        changes: The changes. For versions of the same format, a change of the robot's name comes first, then
             changes of joints, then changes of links.
-        effects: One entry for each joint or link whose changes move links. Each entry is the effect if all
-            other joints are unchanged. Without an entry: a joint that moves no frame, and a joint whose
-            effect cannot be computed, such as a new joint.
+        effects: Effect of each changed joint or link that moves frames, while all others are unchanged. A
+            new joint has no entry, because its effect cannot be computed.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
-        rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
-            does not list these errors. None if both versions have the same format, or if the verdict of
-            `same` is not `UP_TO_SINGLE`. Infinite if the bound was not computed.
+        rounding: Bound on the pose errors from the single precision of USD files: a distance (m) and an angle
+            (rad). Infinite if the bound was not computed. `changes` does not list these errors. Only a
+            comparison with the verdict `UP_TO_SINGLE` has a bound; otherwise None.
     """
 
     sources: tuple[str, str]
@@ -152,8 +151,8 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     """List the changes between two versions of a robot description.
 
     Versions of the same format are compared attribute by attribute. If the formats differ, for example URDF
-    and MJCF, `diff` lists the differences that `same` finds. Matched joints and links then have the names of
-    the old version.
+    and MJCF, `diff` lists the differences that `same` finds. For matched joints and links, `diff` then uses
+    the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -237,7 +236,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _changes_with_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield the differences that `same` finds if the joints cannot be compared one by one."""
+    """Yield differences of the whole models, for models whose joints cannot be compared one by one."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -263,7 +262,10 @@ def _change_of(difference: Difference) -> Iterator[ModelChange]:
 
 
 def _rename_like_a(result: Sameness) -> KinematicTree:
-    """Return B's tree with A's names for matched joints and links, and for joints before matched links."""
+    """Return B's tree with A's names for matched joints and links.
+
+    An unmatched joint also takes A's name if its child link is matched.
+    """
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
@@ -335,7 +337,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of the joint `name` alone; None if no frame moves or the effect is not computable."""
+    """Return the effect of one changed joint; None if the effect is zero or not computable."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

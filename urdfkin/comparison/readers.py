@@ -1,7 +1,7 @@
 """Compare how other libraries read a robot file: the joints, the order of the joints, and the link poses.
 
 Each library runs in a separate process, with its adapter in `urdfkin/verify/adapters.py`. A joint counts as
-different if the pose of its child link relative to its parent link differs.
+different if its child link has a different pose in the parent link's frame.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ _MAX_CHARACTERS = 200
 
 @dataclass(frozen=True, slots=True)
 class ReaderDifference:
-    """A joint that a library reads differently.
+    """A joint with another pose or motion in a library's model.
 
     Attributes:
-        size: Largest difference between an entry of urdfkin's matrix and the same entry of the library's
-            matrix. The matrix is the pose of the child link in the parent link's frame.
+        size: Largest difference between matching entries of urdfkin's and the library's matrix. The matrix is
+            the pose of the child link in the parent link's frame.
     """
 
     joint: str
@@ -63,8 +63,8 @@ class LibraryReading:
         refused: Reason why the library does not read the file; None if it reads the file.
         missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
             the USD file) are listed. A root link that `load` added is not listed.
-        worst: Largest difference between matching entries of link poses, relative to the first common link. 0
-            if rounding can explain the difference.
+        worst: Largest difference between matching entries of the link poses in the frame of the first common
+            link. 0 if rounding can explain the difference.
     """
 
     library: str
@@ -257,8 +257,8 @@ def _find_cause(
 ) -> tuple[str, str]:
     """Return the cause of a difference, for example "origin rpy" or "axis", and a description.
 
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
-    pose is at the neutral configuration.
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The pose
+    with index 0 belongs to the neutral configuration.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
