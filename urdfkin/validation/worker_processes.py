@@ -6,7 +6,7 @@ worker has one chunk at a time, so each crash can be attributed to a robot.
 
 If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
 separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
-a separate process from the start. The robot is then reported as not verified after the first crash.
+a separate process from the start, and is reported as not verified after the first crash.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """The pipe closes when the parent ends; then end this process."""
+    """Receive chunks. When the parent ends, the pipe closes, and this process ends too."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -140,8 +140,8 @@ class ProcessEngine:
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks of all robots.
 
-        Without `isolate`: the unfinished tasks of a robot that crashed a process run last, in a separate
-        process.
+        If a robot crashes a process, its unfinished tasks run last, in a separate process. With `isolate`,
+        these tasks do not run.
         """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, crash_reason=CRASHED).run()
@@ -156,8 +156,8 @@ class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
     Args:
-        crash_reason: Reason in the report of a robot that crashed its process. With a reason, each process
-            validates only one robot. With None, a process can validate several robots.
+        crash_reason: Reason in the report of a robot that crashed its process. If the argument is None, a
+            process can validate several robots. Otherwise, each process validates one robot.
     """
 
     def __init__(

@@ -53,9 +53,9 @@ def euler_jacobian(axes: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, Any
 def quaternion_jacobian(quat: AnyArray, J_v: AnyArray) -> AnyArray:
     """Return the Jacobian of position and quaternion.
 
-    The derivative of `quat` is half a quaternion product:
+    With the angular velocity w, the derivative of `quat` is half a quaternion product:
 
-        quat' = (w, 0) quat / 2,  w: angular velocity
+        quat' = (w, 0) quat / 2
 
     Args:
         quat: (..., 4) unit quaternions, scalar last.

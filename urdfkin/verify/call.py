@@ -31,7 +31,7 @@ class CallPart(NamedTuple):
 
     Attributes:
         rates: (), (v,) or (v, a).
-        state: (n or 1, 24) result of `BaseMotion.state`.
+        state: Result of `BaseMotion.state`, (n, 24) or (1, 24).
         query: Input of the oracle, converted independently.
     """
 
@@ -49,7 +49,7 @@ class Call:
 
     Args:
         plan: Compiles the tree for link indices.
-        q_v_a: q, or q and v, or q, v and a.
+        q_v_a: (q,), (q, v) or (q, v, a).
         additional_frames: Frames that the call computes, but that are not part of the result.
         options: Arguments of a quantity, for example `gravity`.
     """

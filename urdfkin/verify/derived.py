@@ -7,8 +7,8 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `derive_imu_reading` subtracts
-gravity from the oracle's result, in the sensor's axes. A wrong sign of gravity, or a wrong order of the
-steps, therefore causes a disagreement.
+gravity from the oracle's result, in the sensor's axes. Because the two methods differ, a wrong sign of
+gravity or a wrong order of steps causes a disagreement.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower` of each interval.
+        """Width `upper - lower` of each interval.
 
         The width is 0 only if the true value is a double.
         A width above 0 is at least the distance between two neighbouring doubles.
