@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo.
 
 An oracle is a library whose results urdfkin compares with its own results. This module also converts the
-user's arguments into the form that an oracle receives. Except for units and named poses, this conversion
-shares no code with the conversion for urdfkin's own computation. A wrong broadcast, order or name in one
-conversion therefore causes a disagreement.
+user's arguments into the form that an oracle receives. This conversion and the conversion for urdfkin's own
+computation share only the code for units and named poses. A wrong broadcast, order or name in one conversion
+therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -19,8 +19,8 @@ therefore reads the mimic rules from the URDF text.
 Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one
 number, a planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the nearest
-rotation to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
+Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation that
+is nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
 Davenport's q-method: among all unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest
 rotation. The quaternion of the nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
 """
@@ -133,7 +133,7 @@ class PinocchioLayout:
 
     Args:
         joints: Pinocchio's indices of the moving joints, without the base.
-        names: Names of these joints in the URDF.
+        names: Names of the moving joints in the URDF.
 
     Attributes:
         rate_columns: Column indices of moving joints in Pinocchio's Jacobian, mimic joints included.
@@ -237,8 +237,8 @@ class Frames:
     Args:
         bodies: Frame index of each link.
         joints: Frame index of each joint.
-        parents: Maps a link's frame index to the frame index of the link's parent joint. A missing entry
-            means equal indices.
+        parents: Frame index of the parent joint, by the frame index of the link. A missing entry means equal
+            indices.
     """
 
     def __init__(
@@ -322,7 +322,7 @@ def free_flyer_velocity(base: BaseMotionLike) -> FloatArray:
 def free_flyer_acceleration(base: BaseMotionLike) -> FloatArray:
     """Return the base's spatial acceleration in the base's axes.
 
-    The linear part is acc - w x vel.
+    The linear part is the base's linear acceleration minus w x vel.
     """
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
@@ -334,7 +334,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Because of rounding, the computed q has small components along the other eigenvectors of K.
-    # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
+    # If M is a rotation, multiplication by K + I = 4 q q^T removes these components.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -343,7 +343,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
 def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
     """Return Davenport's matrix K of M.
 
-    K = 4 q q^T - I for a rotation M
+    If M is a rotation with the quaternion q, K is 4 q q^T - I.
     """
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
@@ -356,12 +356,11 @@ def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate the parts of each six-vector by R^T.
+    """Rotate the linear and the angular part y of each six-vector by R^T.
 
-    u, w: vector and scalar part of the quaternion
-    y: linear or angular part
-    c = y x u
-    R^T y = y + 2 w c + 2 (c x u)
+    The quaternion has the vector part u and the scalar part w:
+
+        R^T y = y + 2 w (y x u) + 2 (y x u) x u
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     y = six.reshape(*six.shape[:-1], 2, 3)
@@ -445,8 +444,8 @@ class QueryBatch(NamedTuple):
     """The arguments of an oracle for n configurations.
 
     Attributes:
-        frames_are_joints: If True, `frames` contains `JointFrame` objects.
-            Pinocchio uses its functions for joints, such as `getJointJacobian`.
+        frames_are_joints: If True, `frames` contains `JointFrame` objects, and the oracle calls Pinocchio's
+            functions for joints, such as `getJointJacobian`.
         uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with its functions
             for several frames, which may round differently.
     """
@@ -475,7 +474,7 @@ class OracleQuery:
     """The user's arguments of one call.
 
     Args:
-        named_inputs: A text, a mapping or None for each of q, v and a; None for an array.
+        named_inputs: The user's text or mapping for each of q, v and a, or None for an array.
         joints: Pairs (name, nv).
     """
 
@@ -555,7 +554,7 @@ class OracleQuery:
         """Flatten a result's batch axes; the last `own_axes` axes are not batch axes.
 
         Raises:
-            OracleError: the batch shape is not that of the arguments.
+            OracleError: the batch shapes of the result and of the arguments differ.
         """
         own_shape, frame_axis = (
             result.shape[result.ndim - own_axes :],
@@ -585,7 +584,7 @@ class Oracle:
     Args:
         mimic: If False, mimic joints are independent joints.
         moving_base: A free-flyer moves the root.
-        root_joint: Kind of an added root joint. The text does not contain this joint.
+        root_joint: Kind of the root joint that is added to the joints of the text.
         lock: Values of locked joints, rad or m.
 
     Attributes:
@@ -613,8 +612,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: the joints or coordinates of the oracle and the tree differ in name or order, or a
-                mimic rule cannot be read.
+            OracleError: the oracle cannot read a mimic rule, or its joints or coordinates differ from the
+                tree's in name or order.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -676,8 +675,8 @@ def couple_columns(
 ) -> FloatArray:
     """Return the product J_full G. The kernel and NumPy return identical results.
 
-    `columns` contains the column indices i of J_full, in the order of addition. Column i, multiplied by
-    `factor[i]`, is added to column `index[i]` of the product.
+    For each i in `columns`, column i of J_full is multiplied by `factor[i]` and added to column `index[i]` of
+    the product. The order of `columns` is the order of the additions.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:
