@@ -37,11 +37,11 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, which they chose for readers with red-green or blue-yellow colour blindness.
+#: Okabe and Ito's colours: readers with red-green or blue-yellow colour blindness can distinguish them.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of crosses: disagreements outside their bound, coordinates outside their limits.
+#: Colour of the crosses for disagreements above the bound and for coordinates outside the limits.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {
