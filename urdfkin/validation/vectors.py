@@ -122,7 +122,7 @@ class Result(TypedDict):
     k: Annotated[NonNegativeFloat, doc("Factor k: a tolerance is k * 2^-52 times the size of the terms.")]
     value: Annotated[list[float], doc("The true values, rounded to 17 significant digits.")]
     tolerance: Annotated[
-        list[float], doc("Largest allowed difference from the true value; 0: the result must be equal.")
+        list[float], doc("Largest allowed difference from the true value; 0 requires an equal result.")
     ]
 
 
@@ -278,7 +278,7 @@ def make_configuration(
 
 
 def _format_tolerance(k: float, scale: float) -> str:
-    """Return k * max(eps * scale, smallest subnormal number) as a decimal; "0" if the scale is 0."""
+    """Return the tolerance as a rounded decimal, or "0" if the scale is 0."""
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_TOLERANCE_DIGITS):
@@ -330,7 +330,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
     """Write the test vectors of the robot's default tip.
 
-    If the robot is not in the catalogue, also write its URDF.
+    If the robot is not in the catalogue, the function also writes the URDF.
     """
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:

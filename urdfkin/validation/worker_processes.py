@@ -51,8 +51,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # The parent process also has the worker's end of the pipe open, and closes it here.
-            # The pipe then closes as soon as the worker ends.
+            # The parent closes its copy of the worker's end, so that the pipe closes as soon as the worker
+            # ends.
             theirs.close()
 
     @property
@@ -119,7 +119,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """On Linux, this process ends with its parent even while compiled code hangs."""
+    """End this process with its parent. On Linux, this works even while compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -171,7 +171,7 @@ class _WorkerPool:
         self.to_retry: dict[int, list[Task]] = {}
 
     def run(self) -> None:
-        """Run until no task is left; the worker processes always end."""
+        """Run until no task is left. The worker processes end even after an error."""
         try:
             while True:
                 self._assign_tasks()

@@ -41,7 +41,7 @@ from typing import Any
 
 import numpy as np
 
-#: Value of a joint; several numbers for a planar or floating joint.
+#: Value of a joint: one number, or several numbers for a planar or floating joint.
 JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7

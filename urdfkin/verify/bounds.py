@@ -316,7 +316,7 @@ class Bound:
 def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
     """Broadcast `bound.k` to the batch shape `shape`.
 
-    k <= 0 and k = inf become NaN. No result is within the bound if k is NaN.
+    If k <= 0 or k = inf, k becomes NaN. No result is within a bound with k = NaN.
     """
     k = bound.k.reshape(bound.k.shape[: len(shape)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)

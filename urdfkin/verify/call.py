@@ -113,8 +113,8 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError, because its `reshape` may return another
-        shape. A kernel could then write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError. A subclass may have a different
+        `reshape`, so that a kernel could write past the end of `out`.
         """
         if out is None:
             return None
@@ -139,7 +139,7 @@ class Call:
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def run_and_locate_error(self, function: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `function`; if an input is not finite, raise an error that names the joint."""
+        """Call `function`. If an input is not finite, raise an error that names the joint."""
         try:
             return function(*arguments, **options)
         except NotFiniteError:

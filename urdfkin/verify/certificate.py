@@ -306,7 +306,7 @@ class Ledger:
             account.checked += comparison
 
     def count_unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count unchecked results; `reason` is None for calls with verify=False."""
+        """Count unchecked results. `reason` is None for calls with verify=False."""
         account = self.account(quantity)
         with _ledger_lock:
             if reason is None:

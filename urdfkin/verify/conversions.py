@@ -12,9 +12,9 @@
 `check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
 cannot check the robot.
 
-For a table or a `pinocchio.Model`, urdfkin writes a URDF text. Both programs compute from this text, so a
-comparison of their results cannot find an error in the text. `check_table_source` and `check_model_source`
-find such an error.
+For a table or a `pinocchio.Model`, urdfkin writes a URDF text. urdfkin and Pinocchio compute from this text,
+so a comparison of their results cannot find an error in the text. Therefore, `check_table_source` and
+`check_model_source` compare with the table or the model.
 """
 
 from __future__ import annotations
@@ -250,7 +250,7 @@ def _compute_model_placements(model: Any, q: FloatArray, converted: ConvertedMod
 
 
 def _convert_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert q of urdfkin's tree to q (n, model.nq) of the `pinocchio.Model`; joint names are equal."""
+    """Convert q of urdfkin's tree to q (n, model.nq) of a model with the same joint names."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:

@@ -97,9 +97,10 @@ def _divide_triples(ours, theirs, unit, width, units):
 
 @inline_function()
 def _largest_bits(x, count):
-    """Return the bits of the largest double >= 0. The bits, as integers, have the order of the doubles.
+    """Return the bits of the largest double.
 
-    Some processors set the sign bit of NaN, so the function ignores the sign bit.
+    As integers, the bits of doubles >= 0 have the same order as the doubles. The function ignores the sign
+    bit, because some processors set the sign bit of NaN.
     """
     most = 0
     for j in range(count):

@@ -56,7 +56,7 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
-        answer: Last answer of the reading process that contains a robot.
+        answer: Last answer that contains a robot, from the process that reads the file.
         shapes_refusal: Reason why the robot comes from the file without shapes and inertias. None for a robot
             that comes from the complete file. The reason has no meaning if `with_check_data` was False.
         pinocchio: Answer of Pinocchio's MJCF reader: the placements of bodies, or an error. None without an

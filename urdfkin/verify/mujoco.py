@@ -384,7 +384,8 @@ class MujocoOracle(Oracle):
 def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
     """Return rotation matrices of a planar or floating joint, and the number of its slide joints.
 
-    A planar joint has matrices (n, 2, 2) and 2 slide joints. A floating joint has (n, 3, 3) and 3.
+    A planar joint has matrices (n, 2, 2) and 2 slide joints. A floating joint has matrices (n, 3, 3) and 3
+    slide joints.
     """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
@@ -399,7 +400,7 @@ def _normalise_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    # The model's centre of mass is then exactly the root's origin.
+    # If only the root has a mass, the model's centre of mass is exactly the root's origin.
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
         mass[:] = 0.0

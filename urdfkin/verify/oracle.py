@@ -21,8 +21,8 @@ number, a planar joint three, a floating joint seven, and a mimic joint none.
 
 Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation that
 is nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
-Davenport's q-method: among all unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest
-rotation. The quaternion of the nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
+Davenport's q-method. The quaternion q of the nearest rotation maximizes q^T K q = trace(R(q)^T M), so q is
+the eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules.
 
-    q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
+    Each chain becomes one rule for the independent joint:
+
+        q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
     """
     known: dict[str, Mimic] = {}
     for joint in rules:
@@ -163,7 +165,8 @@ class PinocchioLayout:
                 _JointIndices(size, *full, *at[rule.mimicked_joint], rule.multiplier, rule.offset)
             )
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`; the factor is 0 for the base.
+        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`.
+        #: For the base, the factor is 0.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -446,8 +449,8 @@ class QueryBatch(NamedTuple):
     Attributes:
         frames_are_joints: If True, `frames` contains `JointFrame` objects, and the oracle calls Pinocchio's
             functions for joints, such as `getJointJacobian`.
-        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with its functions
-            for several frames, which may round differently.
+        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with the functions
+            for several frames. These functions may round differently.
     """
 
     frames: Sequence[str]
@@ -493,7 +496,7 @@ class OracleQuery:
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
     def cache_inputs(self) -> None:
-        """Convert and store the inputs before `out` changes: an array in a mapping may share its memory."""
+        """Convert and store the inputs, because an array in a mapping may share memory with `out`."""
         _ = self._inputs
 
     @cached_property
@@ -551,7 +554,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
-        """Flatten a result's batch axes; the last `own_axes` axes are not batch axes.
+        """Flatten the batch axes of a result, which are all axes except the last `own_axes`.
 
         Raises:
             OracleError: the batch shapes of the result and of the arguments differ.

@@ -113,7 +113,7 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 
 #: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: Pinocchio reads chains with fewer joints than this number without a stack overflow, in any thread.
+#: In any thread, Pinocchio can read chains with fewer joints than this number without a stack overflow.
 _SAFE_DEPTH = 100
 #: Maximum nv of a robot, mimic joints included.
 #: At this limit, Pinocchio 4.1.0 needs 2 GB: its memory is about 64 nv^3 bytes (measured).
@@ -197,7 +197,7 @@ def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds all known causes before Pinocchio reads the text. This cause is unknown.
+        # urdfkin has already checked the text for all known causes, so the cause of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,

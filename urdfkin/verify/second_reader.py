@@ -57,7 +57,7 @@ class SecondReading:
     Attributes:
         differences: Differences without a known cause.
         known: Known faults, with joint names.
-        unread: Why there is no comparison.
+        unread: Reason why there is no comparison.
     """
 
     by: str

@@ -182,11 +182,9 @@ class SingularValues(Displayable):
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
-        With the left and right singular vectors u and v, and the derivative J' of J:
-
-            derivative of a singular value = u^T J' v
-
-        If the smallest singular value may be 0, the gradient may not exist, and the result is NaN.
+        The derivative of a singular value is u^T J' v. The vectors u and v are the left and the right
+        singular vector, and J' is the derivative of J. If the smallest singular value may be 0, the gradient
+        may not exist, and the result is NaN.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -254,7 +252,7 @@ def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
 
 
 def _bound_norm(E: FloatArray) -> FloatArray:
-    """Return an upper bound on each matrix's Frobenius norm; all numbers of E are >= 0."""
+    """Return an upper bound on the Frobenius norm of each matrix. All numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
     # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)

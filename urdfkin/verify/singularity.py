@@ -36,7 +36,7 @@ _MAX_COLUMNS = 16
 #: Factor in the bound on the error of a singular value: 16 * (rows + columns) * eps * (Frobenius norm).
 _ROUNDINGS = 16.0
 #: At random configurations, singular values count as 0 if they are below this fraction of the norm.
-#: Unit vectors count as parallel if the smaller singular values are below this number.
+#: Unit vectors count as parallel if all singular values except the largest are below this number.
 _RANK_TOLERANCE = 1e-9
 
 
@@ -186,7 +186,8 @@ class _SingularityExplainer:
     def _compare_samples(self) -> tuple[int, FloatArray]:
         """Return the largest rank of the sampled Jacobians, and a matrix of directions without motion.
 
-        The frame does not move in these directions in any sample. The matrix has orthonormal columns.
+        Each column of the matrix is a direction in which the frame moves in no sample. The columns are
+        orthonormal.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         generic_rank = max(

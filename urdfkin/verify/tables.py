@@ -9,8 +9,8 @@ the motion of base b and of tip t in the world, and r = p_t - p_b:
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. The table's
-results come from `urdfkin.kinematics.equations`, so this module implements the equations independently.
+These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module
+implements the equations again, because the table's results come from `urdfkin.kinematics.equations`.
 
 The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
 that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
@@ -302,11 +302,14 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
 class _SnapEffect:
     """Bounds on the effect of snapping.
 
-    turn: largest rotation of an axis
-    metres: largest displacement of a joint origin or the tip
-    z x d: change <= turn * reach + 2 * metres
-    product of two such vectors: change <= twice this amount
-    cross product of two axes: change <= 2 * turn
+    `turn` is the largest rotation of an axis (rad). `metres` is the largest displacement of a joint origin or
+    the tip.
+
+    | Vector | Change at most |
+    |---|---|
+    | z x d | turn * reach + 2 * metres |
+    | product of two vectors z x d | twice the change of z x d |
+    | cross product of two axes | 2 * turn |
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, error_scales: ErrorScales) -> None:

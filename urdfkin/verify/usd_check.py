@@ -106,7 +106,7 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare a robot with OpenUSD's data, and return a sentence about the result and a remark.
+    """Compare a robot with OpenUSD's data. Return a sentence about the result, and at most one remark.
 
     Raises:
         OracleError: UsdPhysics reads a joint differently.

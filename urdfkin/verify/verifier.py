@@ -78,7 +78,7 @@ class Verifier:
     studies and enclosures.
 
     Args:
-        unverifiable: Why Pinocchio cannot check the robot.
+        unverifiable: Reason why Pinocchio cannot check the robot.
         oracle: Library that checks the methods' results.
 
     Attributes:

@@ -73,7 +73,7 @@ def style(**more: Any) -> Any:
 
 
 def label(name: str) -> str:
-    """Escape unprintable characters in a name for a drawing; XML forbids some unprintable characters."""
+    """Escape unprintable characters in a name, because XML forbids some of them."""
     return escape_unprintable(name)
 
 
@@ -91,7 +91,7 @@ def _matplotlib() -> Any:
 
 
 def figure_bytes(figure: Figure, path: Path) -> bytes:
-    """Return the figure as bytes in the format of `path`'s suffix; equal figures give equal bytes."""
+    """Return the figure as bytes in the format of `path`'s suffix. Equal figures give equal bytes."""
     format_ = path.suffix.removeprefix(".").lower()
     if format_ not in FORMATS:
         raise InputError(
@@ -105,9 +105,9 @@ def figure_bytes(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """Return a figure as an SVG element; `prefix` makes ids unique on the page.
+    """Return a figure as an SVG element.
 
-    The placeholder colours of the figure are replaced as in `PAGE_COLOURS`.
+    `prefix` makes ids unique on the page. `PAGE_COLOURS` replaces the placeholder colours.
     """
     stream = io.StringIO()
     no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))

@@ -44,7 +44,7 @@ class Screen(Protocol):
 
 
 class Player:
-    """The controls of a trajectory; `sample` is the index of the sample that the viewer shows."""
+    """The controls of a trajectory. `sample` is the index of the sample that the viewer shows."""
 
     def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0

@@ -45,7 +45,7 @@ def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k; the first 21 lines differ in colour or dashes."""
+    """Return the colour and the dashes of line k. The first 21 lines differ in colour or dashes."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
@@ -162,7 +162,7 @@ def _draw_coordinates(
 
     If no coordinate changes, the panel shows all coordinates in `indices`. If more than
     `_MOST_NAMES` coordinates are drawn, coordinates that are always within their limits are grey. Thin
-    horizontal lines show the finite limits of each coloured coordinate. Grey coordinates have no such lines.
+    horizontal lines show the finite limits of each coloured coordinate.
     """
     del x
     values: FloatArray = getattr(trajectory, what)

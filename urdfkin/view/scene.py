@@ -22,7 +22,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown.
+#: Maximum size (bytes) of a mesh, material or texture file that the viewer shows.
 LARGEST_FILE = 200_000_000
 
 
@@ -69,7 +69,7 @@ def make_mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape, in the link's frame; a mesh must be readable."""
+    """Return the corners (8, 3) of a box around a shape, in the link's frame. A mesh must be readable."""
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = make_mesh(shape).bounds  # type: ignore[union-attr]

@@ -17,9 +17,9 @@ requests to the running server before the viewer shows a robot. If the server ac
 `new_server` stops the server. A new version of viser can therefore make the viewer fail, but not make the
 viewer insecure.
 
-Every user of the machine can read the command line of the browser. Therefore the command line does not
-contain the address of the viewer. The browser opens a file in a private folder. This file redirects the
-browser to the address.
+Every user of the machine can read the command line of the browser, so this line does not contain the address
+of the viewer. The browser opens a file in a private folder, and this file redirects the browser to the
+address.
 """
 
 from __future__ import annotations
@@ -177,8 +177,7 @@ LOOPBACK = "127.0.0.1"
 _ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
-#: Viser's script creates another script element.
-#: The second replacement adds the nonce to this script element.
+#: The second replacement adds the nonce to a script element that viser's script creates.
 _NONCE_REPLACEMENTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
@@ -200,10 +199,10 @@ class UnguardedError(UrdfkinError, RuntimeError):
 
 
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Start viser's server with the request filter; `server.address` is the address to open.
+    """Start viser's server with the request filter.
 
-    Raise InputError without viser, or if the server cannot listen on `host`. Raise UnguardedError if the
-    installed viser cannot be secured.
+    `server.address` is the address to open. Raise InputError if viser is missing, or if the server cannot
+    listen on `host`. Raise UnguardedError if the installed viser cannot be secured.
     """
     try:
         import viser
@@ -235,7 +234,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 def _require_usable_address(host: str) -> None:
     """Raise InputError if the server cannot listen on the address `host`.
 
-    Without this check, viser would search for a free port forever.
+    Without this error, viser would search for a free port forever.
     """
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -290,7 +289,7 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD_START) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # urdfkin's style and script run before viser's.
+    # The browser loads urdfkin's style and script before viser's.
     own = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
@@ -346,7 +345,7 @@ def _remove_message_handlers(server: Any) -> None:
 
 
 def _test_filter(requests: RequestFilter, port: int) -> None:
-    """Test that the running server returns its page and refuses foreign requests, or raise UnguardedError."""
+    """Raise UnguardedError if the running server does not return its page, or accepts a foreign request."""
     host = requests.address(port).split("/")[2]
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
     websocket = here | {

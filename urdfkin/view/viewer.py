@@ -38,8 +38,7 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Joint ranges (rad, m) of at least this size count as unlimited.
-#: Velocity limits (rad/s, m/s) of at least this size count as unlimited too.
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited.
 _UNLIMITED_RANGE = 100.0
 #: Step of a slider for an angle or an angle's derivative, if shown in degrees or radians.
 #: An arrow key changes the angle by one step.
@@ -287,7 +286,7 @@ _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 
 
 class Viewer:
-    """A robot in a browser tab; q (nq,) is the configuration of the sliders, rad and m."""
+    """A robot in a browser tab. `q` (nq,) is the configuration of the sliders, in rad and m."""
 
     def __init__(
         self,

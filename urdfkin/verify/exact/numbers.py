@@ -33,7 +33,8 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Number of decimal digits for a path without joints. A double has 15 decimal digits.
+#: Number of decimal digits for a path without joints.
+#: A double has about 16 digits.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
@@ -43,8 +44,7 @@ _BITS_PER_DIGIT = math.log2(10.0)
 _ADDITIONAL_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT_DIGITS = 17
-#: Number of digits of intermediate results in `format_decimal`.
-#: `format_decimal` then rounds the decimal to 17 digits.
+#: Number of digits in `format_decimal` before the result is rounded to 17 digits.
 _INTERMEDIATE_DIGITS = 200
 #: Additional bits of precision for the Newton steps of `nearest_rotation`.
 _NEWTON_BITS = 30
@@ -96,11 +96,11 @@ def _round_outward(end: arb, towards: float) -> float:
 
 
 def format_decimal(x: Number, negligible: float) -> str | None:
-    """Return an interval's midpoint as a decimal of 17 digits.
+    """Return an interval's midpoint as a decimal of 17 digits, or None if the interval is too wide.
 
-        radius <= 1e-20 |midpoint|, otherwise None
-        |decimal - true value| <= 0.501 units of the last digit
-        interval contains 0: "0" if radius <= 1e-10 negligible, otherwise None
+    The radius of the interval must be at most 1e-20 |midpoint|. The decimal then differs from the true value
+    by at most 0.501 units of the last digit. An interval that contains 0 returns "0" if its radius is at most
+    1e-10 `negligible`.
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
