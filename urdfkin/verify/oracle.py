@@ -104,7 +104,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
     return {**lock, **mimic_values}
 
 
-#: Sizes (nq, nv) of joints in Pinocchio.
+#: Pairs (nq, nv) of three kinds of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 #: Number nq of a joint in urdfkin. The key is the pair (nq, nv) of the joint in Pinocchio.
 _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
