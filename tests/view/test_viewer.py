@@ -155,7 +155,7 @@ def test_missing_meshes_are_listed_with_the_remedy() -> None:
     assert [markdown_text(name) in words for name in addresses] == [True] * 5 + [False] * 2
     assert "and 2 more" in words
     alone = [Shape("l", "mesh", (1.0, 1.0, 1.0), np.eye(4), None, None, "meshes/a.stl")]
-    assert "Put the files at the paths in the URDF" in missing_words(alone)
+    assert "Copy the mesh files to the paths that the URDF names" in missing_words(alone)
 
 
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])

@@ -70,9 +70,9 @@ _MAX_RANDOM = 2.0
 #: Inputs are rounded to multiples of 1 / _STEPS_PER_UNIT, except quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
 _STEPS_PER_UNIT = 1024.0
-#: The tolerance k * eps * scale is rounded twice: to the nearest number with 12 significant digits,
-#: and then upward to a number with 3 significant digits.
-#: The rounding to 12 digits removes the last digits, which differ between processors.
+#: The tolerance k * eps * scale is rounded to the nearest number with 12 significant digits.
+#: This rounding removes the last digits, which differ between processors.
+#: The tolerance is then rounded upward to 3 significant digits.
 _TOLERANCE_DIGITS, _FIRST_TOLERANCE_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -80,7 +80,7 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: Spatial acceleration = classical acceleration - w x v.
+#: The spatial acceleration is the classical acceleration minus w x v.
 #: The bound of ACCELERATION includes the error of w x v.
 #: Therefore, spatial and classical acceleration have the same bound.
 QUANTITIES = (
@@ -93,11 +93,11 @@ class JointEntry(TypedDict):
 
     name: Annotated[str, doc("Name of the joint.")]
     type: Annotated[str, doc("Type of the joint in the URDF.")]
-    q: Annotated[list[Count], of_length(2), doc("Indices [start, stop]: q[start:stop] belongs to the joint.")]
+    q: Annotated[list[Count], of_length(2), doc("Pair [start, stop]: q[start:stop] belongs to the joint.")]
     v: Annotated[
         list[Count],
         of_length(2),
-        doc("Indices [start, stop]: v[start:stop] and a[start:stop] belong to the joint."),
+        doc("Pair [start, stop]: v[start:stop] and a[start:stop] belong to the joint."),
     ]
 
 
@@ -119,10 +119,10 @@ class Result(TypedDict):
         doc("Reference frame; null for a placement."),
     ]
     shape: Annotated[list[Count], doc("Shape of the result. The last index varies fastest in the lists.")]
-    k: Annotated[NonNegativeFloat, doc("The tolerance in multiples of 2^-52 times the size of the terms.")]
+    k: Annotated[NonNegativeFloat, doc("Factor k: a tolerance is k * 2^-52 times the size of the terms.")]
     value: Annotated[list[float], doc("The true values, rounded to 17 significant digits.")]
     tolerance: Annotated[
-        list[float], doc("Largest allowed difference from the true value; 0: the result must be equal.")
+        list[float], doc("Largest allowed difference from the true value; 0 requires an equal result.")
     ]
 
 
@@ -153,8 +153,8 @@ class Vectors(TypedDict):
     note: Annotated[
         str | None,
         doc(
-            "Known difference between libraries, or why the mimic rules of the robot are invalid."
-            " null: no remark."
+            "Known difference between libraries, or the reason why the robot's mimic rules are invalid;"
+            " null: no note."
         ),
     ]
     joints: list[JointEntry]
@@ -278,7 +278,7 @@ def make_configuration(
 
 
 def _format_tolerance(k: float, scale: float) -> str:
-    """Return k * max(eps * scale, smallest subnormal number) as a decimal; "0" if the scale is 0."""
+    """Return the tolerance as a rounded decimal, or "0" if the scale is 0."""
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_TOLERANCE_DIGITS):
@@ -330,7 +330,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
     """Write the test vectors of the robot's default tip.
 
-    If the robot is not in the catalogue, also write its URDF.
+    If the robot is not in the catalogue, the function also writes the URDF.
     """
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
@@ -406,7 +406,10 @@ def _write_vectors(
 
 
 def _format_result(result: Mapping[str, Any]) -> str:
-    """Return a result as JSON; `value` and `tolerance` are texts, which become numbers without rounding."""
+    """Return a result as JSON.
+
+    `value` and `tolerance` contain decimals as texts. The function writes the digits without rounding.
+    """
     texts = {name: json_text(x) for name, x in result.items()}
     texts |= {name: f"[{', '.join(result[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
@@ -428,7 +431,10 @@ def _compute_sample(
 def _compute_results(
     robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
 ) -> Iterator[dict[str, Any]]:
-    """Compute intervals with `digits` digits; the value of an interval too wide for 17 digits is None."""
+    """Compute results with intervals of `digits` digits.
+
+    An entry of `value` is None if its interval is too wide for 17 digits.
+    """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:
         link = tree.frame_link(frame)

@@ -6,7 +6,7 @@ worker has one chunk at a time, so each crash can be attributed to a robot.
 
 If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
 separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
-a separate process from the start. The robot is then reported as not verified after the first crash.
+a separate process from the start, and is reported as not verified after the first crash.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # The parent process also has the worker's end of the pipe open, and closes it here.
-            # The pipe then closes as soon as the worker ends.
+            # The parent closes its copy of the worker's end, so that the pipe closes as soon as the worker
+            # ends.
             theirs.close()
 
     @property
@@ -110,7 +110,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """The pipe closes when the parent ends; then end this process."""
+    """Receive chunks. When the parent ends, the pipe closes, and this process ends too."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -119,7 +119,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """On Linux, this process ends with its parent even while compiled code hangs."""
+    """End this process with its parent. On Linux, this works even while compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -140,8 +140,8 @@ class ProcessEngine:
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks of all robots.
 
-        Without `isolate`: the unfinished tasks of a robot that crashed a process run last, in a separate
-        process.
+        If a robot crashes a process, its unfinished tasks run last, in a separate process. With `isolate`,
+        these tasks do not run.
         """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, crash_reason=CRASHED).run()
@@ -156,8 +156,8 @@ class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
     Args:
-        crash_reason: Reason in the report of a robot that crashed its process. With a reason, each process
-            validates only one robot. With None, a process can validate several robots.
+        crash_reason: Reason in the report of a robot that crashed its process. If the argument is None, a
+            process can validate several robots. Otherwise, each process validates one robot.
     """
 
     def __init__(
@@ -171,7 +171,7 @@ class _WorkerPool:
         self.to_retry: dict[int, list[Task]] = {}
 
     def run(self) -> None:
-        """Run until no task is left; the worker processes always end."""
+        """Run until no task is left. The worker processes end even after an error."""
         try:
             while True:
                 self._assign_tasks()

@@ -41,7 +41,7 @@ from typing import Any
 
 import numpy as np
 
-#: Value of a joint; several numbers for a planar or floating joint.
+#: Value of a joint: one number, or several numbers for a planar or floating joint.
 JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
@@ -55,8 +55,9 @@ class LibraryModel:
 
     Attributes:
         joints: Names of the joints with a coordinate.
-        compute_poses: Returns the pose (4, 4) of each link, without links that the library merged with
-            others. URDF: relative to the root link. MJCF and USD: relative to the world.
+        compute_poses: Returns the pose (4, 4) of each link that the library has not merged with another link.
+            The poses of a URDF are relative to the root link. The poses of MJCF and USD files are relative to
+            the world.
     """
 
     joints: list[str]
@@ -324,10 +325,7 @@ def read_kinpy(text: str) -> LibraryModel:
 
 
 def read_ikpy(text: str) -> LibraryModel:
-    """Read one path from the root to a tip.
-
-    ikpy does not support branches.
-    """
+    """Read only one path from the root to a tip, because ikpy does not support branches."""
     from ikpy.chain import Chain
 
     root, children = _find_root(text), _find_child_links(text)

@@ -31,7 +31,7 @@ def euler_jacobian(axes: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, Any
     Args:
         axes: Axes as in SciPy, for example "ZYX" for body axes or "xyz" for fixed axes.
         R: (..., 3, 3) rotation from body axes to world axes.
-        J_v: (..., 6, n) velocity Jacobian [linear; angular], world axes.
+        J_v: (..., 6, n) velocity Jacobian [linear; angular] in world axes.
 
     Returns:
         The Jacobian (..., 6, n), and |sin b| or |cos b| (...).
@@ -53,13 +53,13 @@ def euler_jacobian(axes: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, Any
 def quaternion_jacobian(quat: AnyArray, J_v: AnyArray) -> AnyArray:
     """Return the Jacobian of position and quaternion.
 
-    The derivative of `quat` is half a quaternion product:
+    With the angular velocity w, the derivative of `quat` is half a quaternion product:
 
-        quat' = (w, 0) quat / 2,  w: angular velocity
+        quat' = (w, 0) quat / 2
 
     Args:
         quat: (..., 4) unit quaternions, scalar last.
-        J_v: (..., 6, n) velocity Jacobian [linear; angular], world axes.
+        J_v: (..., 6, n) velocity Jacobian [linear; angular] in world axes.
 
     Returns:
         The Jacobian (..., 7, n).

@@ -8,14 +8,14 @@ A result is accepted if no number differs from the oracle's number by more than 
     joints = number of URDF joints on the path + 1, or + 2 for a rotated base
     tilt = sum of the tilts of these joints, rad (`urdfkin.kinematics.roundings`)
 
-*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms, in the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel.
-The scale can be broadcast to the shape of the results.
+*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of their absolute values, and
+has the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel. The
+scale can be broadcast to the shape of the results.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. Rotations do
-not amplify errors. The error therefore grows linearly with the number of joints. The tilts add the error that
-Pinocchio makes if it replaces an axis by a coordinate axis.
+not amplify errors, so the error of a number grows linearly with the number of joints. Pinocchio replaces an
+axis that is close to a coordinate axis by the coordinate axis. The tilts add the error of this replacement.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -35,10 +35,11 @@ rounding error:
 | WORLD | cross product with the frame's position p |
 
 In measurements, each joint adds less than eps * scale to a difference. Rounding errors rarely all have the
-same sign. Reports give each difference as a multiple of eps * scale.
+same sign. Reports state each difference as a multiple of eps * scale.
 
-*Magnitudes.* `compute_magnitudes` replaces each vector by its length in the equations 7.58 and 7.127 to 7.130
-(`urdfkin.kinematics.number_kinds`). Then no term is negative, so no intermediate value exceeds the result.
+*Magnitudes.* `compute_magnitudes` evaluates the equations 7.58 and 7.127 to 7.130 with lengths instead of
+vectors (`urdfkin.kinematics.number_kinds`). No length is negative, so no intermediate value exceeds the
+result.
 
 *Angular acceleration.* The bound on alpha contains w_i instead of w_{i-1}:
 
@@ -74,8 +75,8 @@ VERIFY_KERNELS_MODULE = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
 #: First indices of position, velocities and accelerations in the state of a moving base.
 _BASE_VECTOR_STARTS = 9, 12, 15, 18, 21
-#: Number of configurations per block of the kernel `lengths`. The five bounds of one link need 2.5 kB per
-#: block, so the bounds of several links fit into the L1 cache.
+#: Number of configurations per block of the kernel `lengths`.
+#: The five bounds of one link need 2.5 kB, so the bounds of several links fit into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
@@ -84,13 +85,12 @@ class Magnitudes:
     """Upper bounds on the lengths of a frame's position, velocities and accelerations.
 
     Attributes:
-        p: (n, frames) length of the path from the world's origin to the frame, including the displacements
-            of joints, m.
+        p: (n, frames) path length from the world's origin to the frame, with joint displacements, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) allowed relative error of each vector in a product, eps.
+        roundings: (n, frames) allowed relative error of one vector in a product, in eps.
     """
 
     p: FloatArray
@@ -108,7 +108,8 @@ def compute_magnitudes(
     """Return upper bounds for all frames.
 
     `base` is the result of `BaseMotion.state`: one row for all configurations, or n rows.
-    If `v` is None, only `p` and `roundings` are valid. If `a` is None, the joint accelerations are 0.
+    If `v` is None, the function computes only `p` and `roundings`. If `a` is None, the joint accelerations
+    are 0.
     """
     n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
@@ -146,7 +147,7 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """The bits equal those of `_fill_without_kernel`."""
     joints = lengths.joints
-    # The stride of an input is 0 if all configurations share one row.
+    # If all configurations share one row, the stride is 0, and the kernel receives only this row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -176,7 +177,7 @@ class _MovingJoint(NamedTuple):
     """A moving joint.
 
     Attributes:
-        parent: Index in `_Lengths.joints` of the previous moving joint; -1: the base.
+        parent: Index of the previous moving joint in `_Lengths.joints`, or -1 for the base.
         length: Path length from the previous moving joint, m.
         multiplier: Absolute mimic multiplier.
         offset: Absolute mimic offset, rad or m.
@@ -195,7 +196,7 @@ class _FrameEnd(NamedTuple):
     """The part of a frame's path after the last moving joint.
 
     Attributes:
-        step: Index in `_Lengths.joints` of the last moving joint on the path; -1: no moving joint.
+        step: Index of the last moving joint on the path in `_Lengths.joints`, or -1 without a moving joint.
         length: Length after this joint, m.
     """
 
@@ -265,7 +266,10 @@ def _propagate_position(joint: _MovingJoint, state: LinkBounds, q: Any) -> LinkB
 
 
 def _free_lengths(joint: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the norms of displacement, angular and linear velocity, angular and linear acceleration."""
+    """Return the norms of a joint's displacement, velocities and accelerations.
+
+    The order is displacement, angular velocity, linear velocity, angular acceleration, linear acceleration.
+    """
     at, (translations, rotations) = joint.v, _TRANSLATION_ROTATION_COUNTS[joint.kind]
     (u, o), (u_rate, o_rate) = (
         (
@@ -298,7 +302,7 @@ _allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 class Bound:
     """The bound k * eps * scale on a difference.
 
-    Results must be equal where the scale is 0.
+    If the scale of a number is 0, both results must be equal.
 
     Attributes:
         scale: Bound on the sum of absolute terms, in the unit of the result.
@@ -312,7 +316,7 @@ class Bound:
 def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
     """Broadcast `bound.k` to the batch shape `shape`.
 
-    k <= 0 and k = inf become NaN. No result is within the bound if k is NaN.
+    If k <= 0 or k = inf, k becomes NaN. No result is within a bound with k = NaN.
     """
     k = bound.k.reshape(bound.k.shape[: len(shape)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -322,10 +326,9 @@ def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
 def make_bound(
     scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _LOCAL_WORLD_ALIGNED
 ) -> Bound:
-    """Return the bound of a quantity with `factors` factors.
+    """Return the bound of a quantity, with k = factors * roundings.
 
-    LOCAL_WORLD_ALIGNED: k = factors * roundings
-    LOCAL, WORLD: k = (factors + 1) * roundings
+    The reference frames LOCAL and WORLD have one additional factor.
     """
     factors += reference is not _LOCAL_WORLD_ALIGNED
     k = factors * magnitudes.roundings
@@ -334,7 +337,7 @@ def make_bound(
 
 @_allow_overflow
 def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
-    """Convert magnitudes for Pinocchio to magnitudes for MuJoCo.
+    """Convert the magnitudes of Pinocchio's computation to those of MuJoCo's computation.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass:
 
@@ -363,10 +366,10 @@ class DecimalErrors(NamedTuple):
     """Errors from converting a URDF's decimals to doubles.
 
     Attributes:
-        angles: (n,) sum of the angle errors, eps rad.
+        angles: (n,) sum of the angle errors, in multiples of eps rad.
         rule_count: Number of rules of all mimic joints on the path. For example, joint c has two rules if
             c mimics b and b mimics a.
-        lengths: (steps + 1,) additional `CompiledTree.lengths`, m.
+        lengths: (steps + 1,) lengths that are added to `CompiledTree.lengths`, m.
     """
 
     angles: FloatArray
@@ -555,7 +558,7 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Count of cross products in the linear rows of Pinocchio's Hessian, dJ_i/dq_j.
+#: Number of cross products with which Pinocchio computes the linear rows of dJ_i/dq_j.
 #: The joints on the path are numbered from the root.
 #:
 #: | | Two revolute joints, z x (z x d) | A revolute and a prismatic joint, z x z |
@@ -619,8 +622,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound on Jacobians with Euler angles.
 
-    The position rows have the bound of the velocity Jacobian. The other rows are u . w for the middle angle,
-    and r . w for the first and last angle:
+    The position rows have the same bound as the velocity Jacobian. The other rows are u . w for the middle
+    angle, and r . w for the first and last angle:
 
         w: angular part of a column of the velocity Jacobian
         e_i, u, t = R e_k: first, middle and last axis (`urdfkin.verify.analytical_reference`)
@@ -661,7 +664,7 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound on Jacobians with quaternions.
 
-    The position rows have the bound of the velocity Jacobian, and q' has the bound of w:
+    The position rows have the same bound as the velocity Jacobian, and q' has the same bound as w:
 
         delta: error of R
         elements of 4 q q^T: linear functions of R
@@ -691,19 +694,19 @@ def sign_limit(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
 def singularity_margin(plan: CompiledTree) -> float:
     """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    margin = 4 * (error of a frame's rotation, for a base without rotation)
-    below the margin: no digit of the Euler angles is reliable
+    The margin is four times the error of a frame's rotation, for a base without rotation. Below the margin,
+    no digit of the Euler angles is reliable.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Sum |multiplier| over the joints on each path that move with the same joint velocity.
+    """Add up |multiplier| of the joints on a path that move with the same joint velocity.
 
     For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
     Returns:
-        Sums for rotations (frames, nv), and sums for translations (frames, nv).
+        Two arrays (frames, nv): the sums for rotations and the sums for translations.
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
@@ -723,8 +726,8 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    If the result is False, the Jacobian entry is 0 for every q. Exception: for the reference WORLD with
-    `root_at_origin=True`, a base motion can make this Jacobian entry nonzero. For the other references, the
+    If the result is False, the Jacobian entry is 0 for every q. For the reference WORLD with
+    `root_at_origin=True`, a base motion can still make the entry nonzero. For the other references, the
     result does not depend on `root_at_origin`.
 
         linear rows of a revolute joint: z x d

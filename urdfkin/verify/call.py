@@ -31,7 +31,7 @@ class CallPart(NamedTuple):
 
     Attributes:
         rates: (), (v,) or (v, a).
-        state: (n or 1, 24) result of `BaseMotion.state`.
+        state: Result of `BaseMotion.state`, (n, 24) or (1, 24).
         query: Input of the oracle, converted independently.
     """
 
@@ -49,7 +49,7 @@ class Call:
 
     Args:
         plan: Compiles the tree for link indices.
-        q_v_a: q, or q and v, or q, v and a.
+        q_v_a: (q,), (q, v) or (q, v, a).
         additional_frames: Frames that the call computes, but that are not part of the result.
         options: Arguments of a quantity, for example `gravity`.
     """
@@ -113,8 +113,8 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError, because its `reshape` may return another
-        shape. A kernel could then write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError. A subclass may have a different
+        `reshape`, so that a kernel could write past the end of `out`.
         """
         if out is None:
             return None
@@ -139,7 +139,7 @@ class Call:
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def run_and_locate_error(self, function: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `function`; if an input is not finite, raise an error that names the joint."""
+        """Call `function`. If an input is not finite, raise an error that names the joint."""
         try:
             return function(*arguments, **options)
         except NotFiniteError:

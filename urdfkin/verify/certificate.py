@@ -33,8 +33,8 @@ class VerificationError(UrdfkinError):
     Attributes:
         quantity: Name of the quantity.
         frame: Name of the frame.
-        reference: Name of the reference frame. For an analytical Jacobian, the representation of the
-            rotation, such as "quaternion".
+        reference: Name of the reference frame. For an analytical Jacobian or an orientation, `reference` is
+            the representation of the rotation, such as "quaternion".
         index: Index of the worst sample in the batch.
         ours: urdfkin's result for the worst sample.
         theirs: The oracle's result for the worst sample.
@@ -122,7 +122,7 @@ class CertificateDocument(Header):
     source_notes: Annotated[
         str,
         doc(
-            "Text about the checked conversion of another format to URDF, and about locked joints;"
+            "Notes about the conversion of the source to URDF, and about locked joints;"
             " empty for a URDF without locked joints."
         ),
     ]
@@ -148,10 +148,10 @@ class Certificate(Displayable):
     Attributes:
         robot: The robot's name.
         oracle: Name and version of the oracle, such as "Pinocchio 4.1.0".
-        lines: One line for each quantity with results, checked or not.
+        lines: One line for each computed quantity.
         not_verified: Reasons why results were not checked; empty if every result was checked.
-        source_notes: Text about the checked conversion of another format to URDF, and about locked joints.
-            For a URDF without locked joints, the text is empty.
+        source_notes: Notes about the conversion of the source to URDF, and about locked joints. A URDF
+            without locked joints has no notes.
         source: Source of the robot: a path, a catalogue name, "-" for standard input, or a label such as
             "<text>".
         sha256: SHA-256 digest of the MJCF or USD file, or of the URDF text in UTF-8.
@@ -269,8 +269,8 @@ class Account:
     Attributes:
         unchecked: Unchecked results of calls with checks.
         disabled_checks: Results of calls with verify=False.
-        counters: Pairs (array, index), one for each prepared function with verify=False. array[index] is the
-            number of results that the function has returned.
+        counters: One pair (array, index) for each prepared function with verify=False. The function counts
+            its results in `array[index]`.
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
@@ -306,7 +306,7 @@ class Ledger:
             account.checked += comparison
 
     def count_unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count unchecked results; `reason` is None for calls with verify=False."""
+        """Count unchecked results. `reason` is None for calls with verify=False."""
         account = self.account(quantity)
         with _ledger_lock:
             if reason is None:

@@ -1,8 +1,8 @@
 """Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
 `disagreement` defines the difference of two numbers. NumPy takes as long for the differences as Pinocchio
-takes for the results. After some computing time, a compiled kernel therefore replaces NumPy. The kernel and
-NumPy return equal numbers.
+takes for the results. Therefore, a compiled kernel replaces NumPy after some computing time
+(`urdfkin.compiled.preload`). The kernel and NumPy return equal numbers.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_SUBNORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import VERIFY_KERNELS_MODULE, Bound, broadcast_k
 
-#: These kernels check a call with a single configuration.
+#: Kernels that check a call with a single configuration.
 CHECK_KERNEL_NAMES = "worst", "coupling"
 _NO_BITS = np.empty(0, dtype=np.int64)
 
@@ -41,7 +41,7 @@ class BatchComparison:
     def __add__(self, other: BatchComparison) -> BatchComparison:
         """Combine the comparisons of two batches.
 
-        NaN counts as larger than any number.
+        A bound ratio of NaN counts as the largest.
         """
         second_is_larger = other.bound_ratio > self.bound_ratio or (
             np.isnan(other.bound_ratio) and not np.isnan(self.bound_ratio)
@@ -78,7 +78,10 @@ def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
 
 
 def bound_ratios(units: FloatArray, k: FloatArray) -> FloatArray:
-    """Divide differences in multiples of eps * scale by k; inf if the bound is invalid (k is NaN)."""
+    """Return the ratios `units / k` of difference to bound.
+
+    The ratio is inf if the bound is invalid (k is NaN).
+    """
     return np.where(np.isnan(k), np.inf, units / k)
 
 
@@ -86,7 +89,8 @@ def bound_ratios(units: FloatArray, k: FloatArray) -> FloatArray:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf for unequal numbers with a scale of 0, and if a number or its scale is inf or NaN.
+    The result is inf if a number or its scale is inf or NaN. For unequal numbers with a scale of 0, the
+    result is inf too.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, SMALLEST_SUBNORMAL), 0.0)
     difference = np.abs(ours - theirs)
@@ -99,7 +103,7 @@ def worst_disagreements(
 ) -> FloatArray:
     """Return the largest difference in each result, in multiples of eps * scale.
 
-    The first `leading_axes` axes of `ours` are batch axes. The remaining axes are the axes of one result.
+    The first `leading_axes` axes of `ours` are batch axes. All other axes belong to one result.
 
     Returns:
         Array of shape `ours.shape[:leading_axes]`.
@@ -118,7 +122,7 @@ def worst_disagreements(
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If `scale_rows` has fewer than n rows, the kernel uses `unit`, `units` and `bits` as working memory.
+        # If `scale_rows` has fewer than n rows, the kernel needs working memory: `unit`, `units` and `bits`.
         if len(scale_rows) < n:
             unit, units, out_bits = np.empty(scale_rows.size), np.zeros(width), worst.view(np.int64)
             bits = units.view(np.int64)

@@ -12,9 +12,9 @@
 `check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
 cannot check the robot.
 
-For a table or a `pinocchio.Model`, urdfkin writes a URDF text. Both programs compute from this text, so a
-comparison of their results cannot find an error in the text. `check_table_source` and `check_model_source`
-find such an error.
+For a table or a `pinocchio.Model`, urdfkin writes a URDF text. urdfkin and Pinocchio compute from this text,
+so a comparison of their results cannot find an error in the text. Therefore, `check_table_source` and
+`check_model_source` compare with the table or the model.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
         if not joint.backwards and not joint.kind.turns:
             expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
     differences = np.abs(ours - expected)[:, :, :3]
-    # NaN is a disagreement: `np.maximum` returns NaN, and `not nan <= 1` is true.
+    # NaN is a disagreement: `np.maximum` returns NaN, and the comparison NaN <= 1 is False.
     metres = differences[..., 3].max(initial=0.0)
     direction = np.maximum(differences[..., 2].max(initial=0.0), differences[:, -1, :, :3].max(initial=0.0))
     ends = [i for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
@@ -175,8 +175,8 @@ def check_orientations(
 ) -> None:
     """Compare Pinocchio's rotations with verified rotations.
 
-    Rotation matrices are unique; angles at gimbal lock and signs of quaternions are not. The bound includes
-    the rounding errors of `R`.
+    The function compares rotation matrices, because angles at gimbal lock and signs of quaternions are not
+    unique. The bound includes the rounding errors of `R`.
 
     `orientations` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
     `make_command(k)` returns a command that computes sample k again.
@@ -250,7 +250,7 @@ def _compute_model_placements(model: Any, q: FloatArray, converted: ConvertedMod
 
 
 def _convert_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert q of urdfkin's tree to q (n, model.nq) of the `pinocchio.Model`; joint names are equal."""
+    """Convert q of urdfkin's tree to q (n, model.nq) of a model with the same joint names."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
@@ -273,8 +273,9 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     differences = np.abs(theirs - table.placement(own))[:, :3]
-    # The rotation matrices of the table's base and tool may be rounded to six digits, but the URDF contains
-    # exact rotations. The bound therefore includes the deviation of these matrices from rotation matrices.
+    # The rotations of the table's base and tool may be rounded to six digits, but the URDF contains exact
+    # rotations.
+    # The bound therefore includes the orthogonality error of the table's rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * written_urdf_roundings(rows) + defect
     allowed = metres * (written_urdf_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))

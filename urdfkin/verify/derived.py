@@ -7,8 +7,8 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `derive_imu_reading` subtracts
-gravity from the oracle's result, in the sensor's axes. A wrong sign of gravity, or a wrong order of the
-steps, therefore causes a disagreement.
+gravity from the oracle's result, in the sensor's axes. Because the two methods differ, a wrong sign of
+gravity or a wrong order of steps causes a disagreement.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def derive_analytical_jacobian(
         quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs = quaternion_jacobian(quat, J_v)
-        # q and -q are the same rotation; results have qw >= 0.
+        # q and -q are the same rotation, and results have qw >= 0.
         # Both signs are accepted if |qw| is below the rounding error.
         opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))

@@ -61,7 +61,7 @@ def _in_eps_scale(difference, size):
 
 @inline_function(fastmath={"nnan", "nsz"})
 def _largest_difference(ours, theirs, scale, i, k):
-    """Return the largest |ours[i, j] - theirs[i, j]| of finite numbers, in units of eps * scale[k, j]."""
+    """Return the largest difference in row i, in multiples of eps * scale[k]; all numbers are finite."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _in_eps_scale(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -70,7 +70,7 @@ def _largest_difference(ours, theirs, scale, i, k):
 
 @inline_function()
 def _has_equal_triples(scale, k):
-    """Return True if scale[k] has six rows, the first three are equal, and the last three are equal."""
+    """Return whether scale[k] has three equal linear rows and three equal angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -81,10 +81,9 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Compare three rows (x, y, z) with equal scales.
+    """Write to `units` the largest difference of the rows x, y and z in each column.
 
-    units[j] = (largest |ours - theirs| of x, y and z in column j) / unit[j]
-    units[j] may be NaN or inf
+    The difference in column j is in multiples of `unit[j]`. It may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -98,7 +97,11 @@ def _divide_triples(ours, theirs, unit, width, units):
 
 @inline_function()
 def _largest_bits(x, count):
-    """For doubles x, y >= 0: x < y if bits(x) < bits(y). Some processors set the sign bit of NaN."""
+    """Return the bits of the largest double.
+
+    As integers, the bits of doubles >= 0 have the same order as the doubles. The function ignores the sign
+    bit, because some processors set the sign bit of NaN.
+    """
     most = 0
     for j in range(count):
         most = max(most, x[j] & _MASK_WITHOUT_SIGN)
@@ -155,9 +158,10 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 
 @kernel(FLOATS_2D, INTS_1D, INTS_1D, FLOATS_1D, WRITABLE_FLOATS_1D)
 def coupling(full, columns, index, factor, out):
-    """Add Jacobian columns of mimic joints: column i of `full`, times factor[i], to column index[i] of `out`.
+    """Add Jacobian columns of mimic joints.
 
-    `out` contains the rows of the sum, one after the other.
+    Column i of `full` is multiplied by `factor[i]` and added to column `index[i]` of the sum. `out` contains
+    the rows of the sum, one after the other.
     """
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):
@@ -169,8 +173,8 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
-#: Number of bounds (p, w, vel, alpha, acc) per link.
-#: `free` contains displacement, o, u, o_rate and u_rate of each planar or floating joint.
+#: Number of bounds per link: p, w, vel, alpha and acc.
+#: `free` also has five numbers for each planar or floating joint (`urdfkin.verify.bounds._free_lengths`).
 _STATE_SIZE = _FREE_SIZE = 5
 
 

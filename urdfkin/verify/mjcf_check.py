@@ -3,8 +3,7 @@
 Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
 from the MJCF file to the tree. `load` therefore makes three comparisons:
 
-- MuJoCo compiles the file and computes the placements of bodies and sites. These placements must agree with
-  the tree's placements.
+- MuJoCo computes the placements of bodies and sites, which must agree with the tree's placements.
 - The joint equalities of MuJoCo's model must agree with the tree's mimic rules.
 - Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently, so a
   difference from Pinocchio is reported, but is not an error.
@@ -57,11 +56,11 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
-        answer: Last answer with a robot; the process that reads the file can send several answers.
-        shapes_refusal: None if the robot comes from the complete file. Otherwise, the robot comes from
-            the file without shapes and inertias, and `shapes_refusal` is the reason. `shapes_refusal` has no
-            meaning if `read_mjcf` was called without `with_check_data`.
-        pinocchio: Placements of the bodies by Pinocchio's MJCF reader, or an error. None without an answer.
+        answer: Last answer that contains a robot, from the process that reads the file.
+        shapes_refusal: Reason why the robot comes from the file without shapes and inertias. None for a robot
+            that comes from the complete file. The reason has no meaning if `with_check_data` was False.
+        pinocchio: Answer of Pinocchio's MJCF reader: the placements of bodies, or an error. None without an
+            answer.
     """
 
     urdf: str
@@ -166,7 +165,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Return the largest ratio of error to bound, or None if there are no rules."""
+    """Return the largest ratio of error to bound, or None for a robot without mimic rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())

@@ -8,8 +8,8 @@ to standard output:
 2. the robot, compiled from the complete file, or the reason why MuJoCo does not compile this file
 3. the placements of the bodies by Pinocchio's reader
 
-A request without samples has no third answer. Such a request has the second answer only if MuJoCo aligns a
-free body with its inertial frame.
+A request without samples gets no third answer, and gets the second answer only if MuJoCo aligns a free body
+with its inertial frame.
 
 If the process ends early, the answers that it has already written remain valid.
 """

@@ -80,8 +80,8 @@ class _MujocoIndices:
         qvel: Index in MuJoCo's vector.
         q: Index in urdfkin's q; -1 for a moving base. A mimic joint has the mimicked joint's index.
         v: Index in urdfkin's v; -1 for a moving base or locked joint.
-        multiplier: From the mimic rule; 0 for a locked joint.
-        offset: From the mimic rule, or the value of a locked joint.
+        multiplier: Multiplier of the mimic rule; 1 without a rule, 0 for a locked joint.
+        offset: Offset of the mimic rule, or the value of a locked joint.
     """
 
     kind: str
@@ -349,7 +349,7 @@ class MujocoOracle(Oracle):
         return qpos, qvel, qacc
 
     def _compute_velocity_matrix(self, q: FloatArray) -> FloatArray:
-        """Return S with qvel = S v."""
+        """Return the matrix S that converts v to MuJoCo's qvel."""
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, v = joint.qvel, joint.v
@@ -365,7 +365,10 @@ class MujocoOracle(Oracle):
         return S
 
     def _compute_velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative of S: R' = R [w]x for floating and planar joints."""
+        """Return the time derivative of S.
+
+        The rotation R of a floating or planar joint has the derivative R [w]x.
+        """
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, first = joint.qvel, joint.v
@@ -379,7 +382,11 @@ class MujocoOracle(Oracle):
 
 
 def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return (n, 2, 2) rotations and 2 for a planar joint, (n, 3, 3) rotations and 3 for a floating joint."""
+    """Return rotation matrices of a planar or floating joint, and the number of its slide joints.
+
+    A planar joint has matrices (n, 2, 2) and 2 slide joints. A floating joint has matrices (n, 3, 3) and 3
+    slide joints.
+    """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _make_rotation_matrix(_normalise_quaternion(coordinates)), 3
@@ -393,7 +400,7 @@ def _normalise_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    # The model's centre of mass is then exactly the root's origin.
+    # If only the root has a mass, the model's centre of mass is exactly the root's origin.
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
         mass[:] = 0.0

@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo.
 
 An oracle is a library whose results urdfkin compares with its own results. This module also converts the
-user's arguments into the form that an oracle receives. Except for units and named poses, this conversion
-shares no code with the conversion for urdfkin's own computation. A wrong broadcast, order or name in one
-conversion therefore causes a disagreement.
+user's arguments into the form that an oracle receives. This conversion and the conversion for urdfkin's own
+computation share only the code for units and named poses. A wrong broadcast, order or name in one conversion
+therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -19,10 +19,10 @@ therefore reads the mimic rules from the URDF text.
 Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one
 number, a planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the nearest
-rotation to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
-Davenport's q-method: among all unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest
-rotation. The quaternion of the nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
+Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation that
+is nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
+Davenport's q-method. The quaternion q of the nearest rotation maximizes q^T K q = trace(R(q)^T M), so q is
+the eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules.
 
-    q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
+    Each chain becomes one rule for the independent joint:
+
+        q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
     """
     known: dict[str, Mimic] = {}
     for joint in rules:
@@ -102,7 +104,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
     return {**lock, **mimic_values}
 
 
-#: Sizes (nq, nv) of joints in Pinocchio.
+#: Pairs (nq, nv) of three kinds of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 #: Number nq of a joint in urdfkin. The key is the pair (nq, nv) of the joint in Pinocchio.
 _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
@@ -133,7 +135,7 @@ class PinocchioLayout:
 
     Args:
         joints: Pinocchio's indices of the moving joints, without the base.
-        names: Names of these joints in the URDF.
+        names: Names of the moving joints in the URDF.
 
     Attributes:
         rate_columns: Column indices of moving joints in Pinocchio's Jacobian, mimic joints included.
@@ -163,7 +165,8 @@ class PinocchioLayout:
                 _JointIndices(size, *full, *at[rule.mimicked_joint], rule.multiplier, rule.offset)
             )
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`; the factor is 0 for the base.
+        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`.
+        #: For the base, the factor is 0.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -237,8 +240,8 @@ class Frames:
     Args:
         bodies: Frame index of each link.
         joints: Frame index of each joint.
-        parents: Maps a link's frame index to the frame index of the link's parent joint. A missing entry
-            means equal indices.
+        parents: Frame index of the parent joint, by the frame index of the link. A missing entry means equal
+            indices.
     """
 
     def __init__(
@@ -322,7 +325,7 @@ def free_flyer_velocity(base: BaseMotionLike) -> FloatArray:
 def free_flyer_acceleration(base: BaseMotionLike) -> FloatArray:
     """Return the base's spatial acceleration in the base's axes.
 
-    The linear part is acc - w x vel.
+    The linear part is the base's linear acceleration minus w x vel.
     """
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
@@ -334,7 +337,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Because of rounding, the computed q has small components along the other eigenvectors of K.
-    # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
+    # If M is a rotation, multiplication by K + I = 4 q q^T removes these components.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -343,7 +346,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
 def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
     """Return Davenport's matrix K of M.
 
-    K = 4 q q^T - I for a rotation M
+    If M is a rotation with the quaternion q, K is 4 q q^T - I.
     """
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
@@ -356,12 +359,11 @@ def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate the parts of each six-vector by R^T.
+    """Rotate the linear and the angular part y of each six-vector by R^T.
 
-    u, w: vector and scalar part of the quaternion
-    y: linear or angular part
-    c = y x u
-    R^T y = y + 2 w c + 2 (c x u)
+    The quaternion has the vector part u and the scalar part w:
+
+        R^T y = y + 2 w (y x u) + 2 (y x u) x u
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     y = six.reshape(*six.shape[:-1], 2, 3)
@@ -445,10 +447,10 @@ class QueryBatch(NamedTuple):
     """The arguments of an oracle for n configurations.
 
     Attributes:
-        frames_are_joints: If True, `frames` contains `JointFrame` objects.
-            Pinocchio uses its functions for joints, such as `getJointJacobian`.
-        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with its functions
-            for several frames, which may round differently.
+        frames_are_joints: If True, `frames` contains `JointFrame` objects, and the oracle calls Pinocchio's
+            functions for joints, such as `getJointJacobian`.
+        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with the functions
+            for several frames. These functions may round differently.
     """
 
     frames: Sequence[str]
@@ -475,7 +477,7 @@ class OracleQuery:
     """The user's arguments of one call.
 
     Args:
-        named_inputs: A text, a mapping or None for each of q, v and a; None for an array.
+        named_inputs: The user's text or mapping for each of q, v and a, or None for an array.
         joints: Pairs (name, nv).
     """
 
@@ -494,7 +496,7 @@ class OracleQuery:
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
     def cache_inputs(self) -> None:
-        """Convert and store the inputs before `out` changes: an array in a mapping may share its memory."""
+        """Convert and store the inputs, because an array in a mapping may share memory with `out`."""
         _ = self._inputs
 
     @cached_property
@@ -552,10 +554,10 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
-        """Flatten a result's batch axes; the last `own_axes` axes are not batch axes.
+        """Flatten the batch axes of a result, which are all axes except the last `own_axes`.
 
         Raises:
-            OracleError: the batch shape is not that of the arguments.
+            OracleError: the batch shapes of the result and of the arguments differ.
         """
         own_shape, frame_axis = (
             result.shape[result.ndim - own_axes :],
@@ -585,7 +587,7 @@ class Oracle:
     Args:
         mimic: If False, mimic joints are independent joints.
         moving_base: A free-flyer moves the root.
-        root_joint: Kind of an added root joint. The text does not contain this joint.
+        root_joint: Kind of the root joint that is added to the joints of the text.
         lock: Values of locked joints, rad or m.
 
     Attributes:
@@ -613,8 +615,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: the joints or coordinates of the oracle and the tree differ in name or order, or a
-                mimic rule cannot be read.
+            OracleError: the oracle cannot read a mimic rule, or its joints or coordinates differ from the
+                tree's in name or order.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -676,8 +678,8 @@ def couple_columns(
 ) -> FloatArray:
     """Return the product J_full G. The kernel and NumPy return identical results.
 
-    `columns` contains the column indices i of J_full, in the order of addition. Column i, multiplied by
-    `factor[i]`, is added to column `index[i]` of the product.
+    For each i in `columns`, column i of J_full is multiplied by `factor[i]` and added to column `index[i]` of
+    the product. The order of `columns` is the order of the additions.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:

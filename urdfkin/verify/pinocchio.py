@@ -8,9 +8,13 @@ The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF t
 `urdfkin.verify.oracle` converts the user's arguments for Pinocchio and finds frames and joints by name.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
-if their mimic joints are enabled. `urdfkin.verify.oracle` reads the mimic rules from the text. The rules
-define a matrix G and a vector g_0. Then q_full = G q + g_0, v_full = G v and J = J_full G. Pinocchio's
-vectors also contain numbers for the mimic joints. The suffix "full" marks these vectors.
+if their mimic joints are enabled. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic
+joints, and have the suffix "full". `urdfkin.verify.oracle` reads the mimic rules from the URDF text. The
+rules define a matrix G and a vector g_0 for the conversion:
+
+    q_full = G q + g_0
+    v_full = G v
+    J = J_full G
 """
 
 from __future__ import annotations
@@ -109,15 +113,15 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 
 #: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: Pinocchio reads chains with fewer joints than this number without a stack overflow, in any thread.
+#: In any thread, Pinocchio can read chains with fewer joints than this number without a stack overflow.
 _SAFE_DEPTH = 100
-#: Maximum nv of a robot, mimic joints included. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), so 2 GB
-#: at this limit.
+#: Maximum nv of a robot, mimic joints included.
+#: At this limit, Pinocchio 4.1.0 needs 2 GB: its memory is about 64 nv^3 bytes (measured).
 MAX_NV = 315
 
 #: A block of results with this number of doubles (128 kB) fits into the processor's cache.
 _FLOATS_PER_BLOCK = 16384
-#: `compute(n)` returns the results for the next n configurations.
+#: A function of n that returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer's joint and frame.
 _BASE_NAME = "base"
@@ -137,8 +141,8 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    Without enough memory or stack, Pinocchio would crash the process. `lock` contains joint values in rad or
-    m. `lock_mimic_joints` also locks the mimic joints of these joints.
+    Without enough memory or stack, Pinocchio would crash the process. `lock` contains the values of locked
+    joints in rad or m. If `lock_mimic_joints` is True, the mimic joints of locked joints are locked too.
 
     Raises:
         OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.
@@ -193,7 +197,7 @@ def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds all known causes before Pinocchio reads the text. This cause is unknown.
+        # urdfkin has already checked the text for all known causes, so the cause of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -335,10 +339,11 @@ class PinocchioOracle(Oracle):
     def hessians(self, x: QueryBatch) -> FloatArray:
         """Return Pinocchio's Hessians, with two errors of Pinocchio 4.1 corrected.
 
-        - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
-        - In LOCAL, Pinocchio's derivative of a joint's column with respect to the same joint can be nonzero.
-          The true value is 0, because a joint's motion does not change the joint's own columns in the frame's
-          axes.
+        - Pinocchio's array has C order, but the numbers have Eigen's order, in which the first index varies
+          fastest.
+        - In LOCAL, Pinocchio's derivative of a joint's column by the same joint's coordinates can be nonzero.
+          The true derivative is 0, because a joint's motion does not change the joint's own columns in the
+          frame's axes.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, reference, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
@@ -361,7 +366,7 @@ class PinocchioOracle(Oracle):
         """Return the joint Jacobian (n, 6, columns) in WORLD, with mimic joints, without the base."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes for a Jacobian without columns. For one column, it returns a vector.
+        # Pinocchio 4.1 crashes for a Jacobian without columns, and returns a vector for one column.
         for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]

@@ -53,20 +53,20 @@ class Quantity:
         inputs: "q", "qv" or "qva".
         shape: Shape of one result, for example (6, "nv").
         compute: `compute(plan, *inputs, reference, base=, out=, threads=)` returns urdfkin's results.
-            If `recursive` is False, `compute` may have other arguments. If `has_reference` is False,
-            `compute`, `scale` and `compute_intervals` have no argument `reference`.
+            If `recursive` is False, `compute` may have other arguments.
         ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
         factors: Number of vectors in the longest product, for example 3 for w x (w x d).
             `make_bound` adds 1 to `factors` for LOCAL and WORLD.
         results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
-            the bound. If it is not None, checks call it instead of `ask_oracle` and `scale`.
+            the bound. Checks call this function, if there is one, instead of `ask_oracle` and `scale`.
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
-        recursive: True if one forward recursion computes the result, and `compute` has no further arguments,
-            such as `gravity`.
+        recursive: Whether one forward recursion computes the result, without further arguments such as
+            `gravity`.
         in_validation: `validate` compares the quantity if `recursive` and `in_validation` are True. False for
             Hessians, which are nv times larger than Jacobians.
+        has_reference: Whether `compute`, `scale` and `compute_intervals` have the argument `reference`.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.
     """
@@ -220,8 +220,8 @@ JACOBIAN_RATE = Quantity(
     command="jacobian-rate",
     summary="time derivative of a frame's Jacobian",
     help_text="Time derivative J' for joint velocities --v. The table has a row for each column of the"
-    " Jacobian. In local_world_aligned, J a + J' v is the result of `urdfkin acceleration`. In local and"
-    " world, J a + J' v is the spatial acceleration.",
+    " Jacobian. With --reference local_world_aligned, J a + J' v is the result of `urdfkin"
+    " acceleration`. With local or world, J a + J' v is the spatial acceleration.",
     example="urdfkin jacobian-rate panda --q random --v random --frame panda_hand",
 )
 HESSIAN = Quantity(
@@ -259,8 +259,8 @@ ACCELERATION = Quantity(
     units={"linear": "m/s^2", "angular": "rad/s^2"},
     command="acceleration",
     summary="classical acceleration of a frame",
-    help_text="Second derivative of the position of the frame's origin, m/s^2, and angular acceleration,"
-    " rad/s^2, for joint velocities --v and joint accelerations --a. Gravity is not included. --breakdown"
+    help_text="Second derivative of the position of the frame's origin (m/s^2), and angular acceleration"
+    " (rad/s^2). --v and --a are the joint velocities and accelerations. Gravity is not included. --breakdown"
     " lists the transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
     f" {QuestionsSection.TWO_ACCELERATIONS}, {QuestionsSection.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --breakdown",

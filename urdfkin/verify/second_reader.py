@@ -4,8 +4,8 @@ Pinocchio checks the computed results. This module checks the data of the robot:
 axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
 yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
-normalise axes. The report separates these faults from other differences. For a missing number, yourdfpy
-returns None. The comparison replaces None by urdfkin's default value.
+normalise axes. The report separates these faults from other differences. If the URDF omits a number, yourdfpy
+returns None, and the comparison uses urdfkin's default value.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: Each sine and cosine has a relative error of at most one eps, which changes the entry by at most 3 eps.
 #: Rounding the products and the sum changes the entry by at most 1.5 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Bound on the difference between two programs' normalised axes, per component.
+#: Bound on the difference of a component of an axis that two programs normalised.
 #: In urdfkin and yourdfpy, the relative error of an axis's length is at most 2 eps.
 #: The quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS
@@ -57,7 +57,7 @@ class SecondReading:
     Attributes:
         differences: Differences without a known cause.
         known: Known faults, with joint names.
-        unread: Why there is no comparison.
+        unread: Reason why there is no comparison.
     """
 
     by: str
@@ -160,7 +160,7 @@ def _compare_joints(
 
 
 def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
-    """Return the limit with urdfkin's default values."""
+    """Return yourdfpy's limit, with urdfkin's default values for missing numbers."""
     if joint.limit is None:
         return None
     bounded = joint.type in _BOUNDED_KINDS

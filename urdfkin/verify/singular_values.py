@@ -15,9 +15,9 @@
 
     error of a sum of m products <= m eps * (sum of the absolute values of the products)
 
-*Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. The
-numbers of a norm are divided by the largest number, and products are computed from mantissas and exponents.
-If the residual overflows, the lower bound is 0 and the upper bound is inf.
+*Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. Before
+a norm is computed, all numbers are divided by the largest number. Products are computed from mantissas and
+exponents. If the residual overflows, the lower bound is 0 and the upper bound is inf.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ class BoundedArray(NamedTuple):
 class SingularValues(Displayable):
     """Singular values of some rows of a Jacobian.
 
-    Columns that are 0 in every configuration are left out. `print` and notebooks display a table. For a
-    single configuration, the text of `singularity()` follows the table.
+    The decomposition omits columns that are 0 in every configuration. `print` and notebooks display a table.
+    For a single configuration, the text of `singularity()` follows the table.
 
     Attributes:
         rows: The chosen rows of the Jacobian, as a slice.
         values: (..., k) singular values, largest first; k = min(rows, columns).
         U: (..., rows, k) left singular vectors, directions of the frame's velocity.
-        V: (..., nv, k) right singular vectors, directions of v. Left-out columns have 0.
+        V: (..., nv, k) right singular vectors, directions of v. The rows of omitted columns are 0.
         frame_jacobian: The Jacobian with names, or None for another matrix.
 
     >>> import urdfkin
@@ -156,7 +156,7 @@ class SingularValues(Displayable):
     def condition(self) -> BoundedArray:
         """Condition number (...): the largest singular value divided by the smallest.
 
-        The upper bound is inf if the smallest value may be 0. Without columns, all numbers are NaN.
+        The upper bound is inf if the smallest singular value may be 0. Without columns, all numbers are NaN.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -182,12 +182,9 @@ class SingularValues(Displayable):
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
-            derivative of a singular value = u^T J' v
-            u, v: left and right singular vector
-            J': derivative of J
-
-        The gradient is NaN if the smallest singular value may be 0. There may be no derivative at such
-        configurations.
+        The derivative of a singular value is u^T J' v. The vectors u and v are the left and the right
+        singular vector, and J' is the derivative of J. If the smallest singular value may be 0, the gradient
+        may not exist, and the result is NaN.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -221,7 +218,7 @@ def singular_values(
 ) -> SingularValues:
     """Return singular values with guaranteed bounds.
 
-    `error` bounds the error of each number of J. `is_active` (nv,) is False for left-out columns.
+    `error` bounds the error of each number of J. `is_active` (nv,) is False for omitted columns.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -255,7 +252,7 @@ def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
 
 
 def _bound_norm(E: FloatArray) -> FloatArray:
-    """Return an upper bound on each matrix's Frobenius norm; all numbers of E are >= 0."""
+    """Return an upper bound on the Frobenius norm of each matrix. All numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
     # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
@@ -283,7 +280,7 @@ def _bound_above(x: FloatArray) -> FloatArray:
 def _bound_below(x: FloatArray) -> FloatArray:
     """Return a lower bound on the exact number that was computed as x.
 
-    x = inf: the bound is the largest double
+    If x is inf, the bound is the largest double.
     """
     with np.errstate(under="ignore", invalid="ignore"):
         bound = np.nextafter(x - np.abs(x) * _RELATIVE_ROUNDING_ERROR, -np.inf)

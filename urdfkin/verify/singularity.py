@@ -33,10 +33,10 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 _MAX_SET_SIZE = 4
 #: With more than `_MAX_COLUMNS` columns, `_find_dependent_sets` finds no sets.
 _MAX_COLUMNS = 16
-#: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
+#: Factor in the bound on the error of a singular value: 16 * (rows + columns) * eps * (Frobenius norm).
 _ROUNDINGS = 16.0
 #: At random configurations, singular values count as 0 if they are below this fraction of the norm.
-#: Unit vectors count as parallel if the smaller singular values are below this number.
+#: Unit vectors count as parallel if all singular values except the largest are below this number.
 _RANK_TOLERANCE = 1e-9
 
 
@@ -45,11 +45,11 @@ class FrameJacobian:
     """A robot's Jacobian with names.
 
     Attributes:
-        J: (..., 6, nv) Jacobian at the frame's origin, world axes.
+        J: (..., 6, nv) Jacobian at the frame's origin, in world axes.
         error: (..., 6, nv) bounds on the errors of J.
-        is_revolute: (nv,) True: revolute joint. False: prismatic joint.
-            None: planar joint, floating joint, or joint that a mimic joint follows.
-        active_entries: (6, nv) False for entries that are always 0.
+        is_revolute: (nv,) True for a revolute joint, False for a prismatic joint. None for a joint with
+            several columns, and for a joint with a mimic joint.
+        active_entries: (6, nv) False for entries of J that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
             base. A moving base can change the directions without motion.
         moving_base: Whether a base motion is given.
@@ -84,8 +84,8 @@ class Singularity(Displayable):
         full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
         lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin.
-            Directions in which the frame never moves are left out. If the directions in which the frame never
-            moves depend on q or on a moving base, the array is empty.
+            The array omits directions in which the frame never moves. If these directions depend on q or on a
+            moving base, the array is empty.
         null_motions: (e, nv) independent joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons.
 
@@ -163,7 +163,8 @@ class _SingularityExplainer:
         directions = U[:, self._rank :].T
         directions = _make_orthonormal_basis(directions - directions @ fixed_directions @ fixed_directions.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If such a direction depends on q, it looks like a direction that is lost only at this q.
+        # If these directions depend on q, they cannot be distinguished from directions that are lost only at
+        # one q.
         is_known = len(directions) == generic_rank - self._rank and not (
             self._frame_jacobian.moving_base and fixed_directions.size
         )
@@ -185,7 +186,8 @@ class _SingularityExplainer:
     def _compare_samples(self) -> tuple[int, FloatArray]:
         """Return the largest rank of the sampled Jacobians, and a matrix of directions without motion.
 
-        The frame does not move in these directions in any sample. The matrix has orthonormal columns.
+        Each column of the matrix is a direction in which the frame moves in no sample. The columns are
+        orthonormal.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         generic_rank = max(
@@ -239,8 +241,8 @@ class _SingularityExplainer:
 
     def _merge_overlapping_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         joined: list[set[int]] = []
-        # In linear rows, a minimal set of three columns spans a plane, but three columns in merged pairs span
-        # a line. `_describe_linear_rows` does not describe the line.
+        # `_describe_linear_rows` expects that three columns span a plane.
+        # Three columns of merged pairs would span a line, so pairs of linear rows are not merged.
         if self._linear_only:
             return sets
         for pair in (set(columns) for columns in sets if len(columns) == 2):
@@ -318,9 +320,9 @@ class _SingularityExplainer:
             return None
         point = np.cross(f, m) / (f @ f)
         return (
-            f"Each axis intersects or is parallel to the line along {_format_vector(f / np.linalg.norm(f))}"
-            f" through the point at {_format_vector(point)} m"
-            f" from the origin of {self._frame_jacobian.frame}, in world axes."
+            f"Each axis intersects the line along {_format_vector(f / np.linalg.norm(f))} through the point"
+            f" at {_format_vector(point)} m from the origin of {self._frame_jacobian.frame}, in world axes,"
+            " or is parallel to this line."
         )
 
     def _describe_null_motion(self, motion: FloatArray) -> str:

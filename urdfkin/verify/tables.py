@@ -9,22 +9,21 @@ the motion of base b and of tip t in the world, and r = p_t - p_b:
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. The table's
-results come from `urdfkin.kinematics.equations`, so this module implements the equations independently.
+These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module
+implements the equations again, because the table's results come from `urdfkin.kinematics.equations`.
 
 The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
 that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
 effect of the rounded angles. The bound on rounding errors is proportional to a length, usually the robot's
-reach. The reach is the sum of two path lengths. One path leads from the root to the table's base, the other
-path from the root to the tip. Both lengths include prismatic displacements. If the sum of all lengths in the
-table is larger than the reach, the bound uses the sum instead of the reach. A sum above `MAX_LENGTH_RATIO`
-times the reach is reduced to this limit. In a table with Hayati rows, no single length is larger than
-`MAX_LENGTH_RATIO` times the reach. A coordinate can move several joints by mimic rules. The bound on a
-Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
+reach. The reach is the path length from the root to the table's base, plus the path length from the root to
+the tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than
+the reach, the bound uses this sum, but at most `MAX_LENGTH_RATIO` times the reach. With Hayati rows, each
+length in the table is at most `MAX_LENGTH_RATIO` times the reach (docs/dh.md). By mimic rules, a coordinate
+can move several joints, so the bound on a Jacobian column is proportional to the sum of their |multiplier|.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
-such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
-error, and `TableCheck.loss` states the error.
+lengths of this size cancel, the tip has an error of eps times the lengths. urdfkin accepts a difference
+within this error, and `TableCheck.loss` states the error.
 """
 
 from __future__ import annotations
@@ -45,8 +44,7 @@ from urdfkin.model.configuration import Samples
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
-#: The bound counts the sum of a table's lengths up to this multiple of the reach.
-#: No length in a table with Hayati rows exceeds this multiple (docs/dh.md).
+#: The bound uses the sum of a table's lengths, but at most this multiple of the reach.
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -73,10 +71,10 @@ class TableCheck:
     Attributes:
         metres: Distance between the tips, m.
         radians: Angle between the orientations, rad.
-        units: Differences in units of eps * scale. The scale of the angle between orientations is 1.
+        units: Differences in multiples of eps * scale. The scale of the angle between orientations is 1.
         bound_ratios: Ratios of difference to bound.
         has_snapping: Whether the bound includes snapping.
-        loss: Why very large lengths cause a difference, or None.
+        loss: Sentence about a very large length that causes a difference, or None.
     """
 
     samples: int
@@ -172,8 +170,7 @@ def _compare_with_bounds(
     ones = np.ones_like(error_scales.reach)
     columns = error_scales.turning + error_scales.sliding
     reach, slides = error_scales.reach[:, None], 1.0 if error_scales.sliding.any() else 0.0
-    #: Each quantity has one pair of numbers for linear differences, and one pair for angular differences.
-    #: The first number of a pair is the scale of rounding errors; the second is the effect of snapping.
+    #: Each quantity has a pair (scale, snapping) for linear differences, and a pair for angular differences.
     #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((error_scales.reach, snap_effect.metres), (ones, snap_effect.turn)),
@@ -249,7 +246,7 @@ class ErrorScales:
     All sums are over the joints on the paths from the root to the table's base and tip.
 
     Attributes:
-        reach: (n,) reach, m; see the module's docstring.
+        reach: (n,) reach in m, as defined in the module's docstring.
         turning: (columns,) sum of |multiplier| over the revolute joints.
         sliding: (columns,) sum of |multiplier| over the prismatic joints.
         rates: (n,) sum of |multiplier * v| over all joints.
@@ -305,11 +302,14 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
 class _SnapEffect:
     """Bounds on the effect of snapping.
 
-    turn: largest rotation of an axis
-    metres: largest displacement of a joint origin or the tip
-    z x d: change <= turn * reach + 2 * metres
-    product of two such vectors: change <= twice this amount
-    cross product of two axes: change <= 2 * turn
+    `turn` is the largest rotation of an axis (rad). `metres` is the largest displacement of a joint origin or
+    the tip.
+
+    | Vector | Change at most |
+    |---|---|
+    | z x d | turn * reach + 2 * metres |
+    | product of two vectors z x d | twice the change of z x d |
+    | cross product of two axes | 2 * turn |
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, error_scales: ErrorScales) -> None:

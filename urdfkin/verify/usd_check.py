@@ -41,8 +41,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Tolerance for the angle between OpenUSD's and urdfkin's frame of a joint:
-#: angle (rad) <= `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
+#: Tolerance for the angle (rad) between OpenUSD's and urdfkin's frame of a joint, in roundings to single
+#: precision. `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
 #: Tolerance for the origin of a joint's frame, in roundings to single precision.
 #: `_check_joint` derives this bound.
@@ -106,7 +106,7 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare a robot with OpenUSD's data, and return a sentence about the result and a remark.
+    """Compare a robot with OpenUSD's data. Return a sentence about the result, and at most one remark.
 
     Raises:
         OracleError: UsdPhysics reads a joint differently.
@@ -179,9 +179,9 @@ class SinglePrecisionErrors:
     """Bounds on errors of rounding to single precision.
 
     Attributes:
-        links: (links, 2) largest position error (m), angle error (rad), over all configurations.
-        joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule.
-            Columns 0 and 1: errors of the child link's pose relative to the parent link, at q = 0.
+        links: (links, 2) largest position error (m) and largest angle error (rad) in any configuration.
+        joints: (joints, 3) position error (m), angle error (rad), and relative error of the mimic rule.
+            The first two are errors of the child link's pose in the parent link, at q = 0.
     """
 
     links: FloatArray

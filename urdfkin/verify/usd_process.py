@@ -24,7 +24,7 @@ from urdfkin.urdf.usd import Usd, UsdJoint, import_openusd, read_usd
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.mjcf_process import make_error_answer, pack_array, write_answer
 
-#: A limit of this size means no limit.
+#: A limit of at least this absolute value means that the joint has no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
 
@@ -60,7 +60,10 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_joints_twice(usd: Usd) -> dict[str, Any]:
-    """Return the joints' descriptions by urdfkin and by UsdPhysics, by path; None: the joint is missing."""
+    """Return urdfkin's and UsdPhysics's description of each joint, by path.
+
+    UsdPhysics's description is None if UsdPhysics does not find the joint.
+    """
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
@@ -69,8 +72,8 @@ def _read_joints_twice(usd: Usd) -> dict[str, Any]:
         parsed = load(usd.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, description in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI has two descriptions in OpenUSD.
-            # One describes the joint, and the other describes an articulation and is skipped.
+            # For a joint with PhysicsArticulationRootAPI, OpenUSD also describes an articulation.
+            # This function skips the articulation.
             if str(path) in usd.joints and isinstance(description, physics.JointDesc):
                 found[str(path)] = _describe_joint(physics, str(path), description, usd)
     return {path: [ours.as_list(), found.get(path)] for path, ours in usd.joints.items()}

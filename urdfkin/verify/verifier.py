@@ -1,7 +1,7 @@
 """Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
 
-The oracle receives the user's arguments. `Verifier.check` receives a result in the user's batch shape. The
-check therefore also finds errors in the conversion of a result to the batch shape.
+The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape, so it
+also finds errors in the conversion of a result to this shape.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Verify = bool | Literal["sample"]
 SAMPLE_SIZE = 100
 
 #: Maximum number of values that are compared at once.
-#: The values then fit into the processor's cache.
+#: This number of values (2 MB) fits into the processor's cache.
 _MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
 _MAX_CONFIGURATIONS = 4096
@@ -78,7 +78,7 @@ class Verifier:
     studies and enclosures.
 
     Args:
-        unverifiable: Why Pinocchio cannot check the robot.
+        unverifiable: Reason why Pinocchio cannot check the robot.
         oracle: Library that checks the methods' results.
 
     Attributes:
@@ -234,9 +234,9 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that calls `compute` and checks the result.
 
-        The returned function has the arguments of `compute`; the last is `out`.
-        The function returns None if `compute` does not support the arguments.
-        If the oracle cannot check the robot, the function always returns None.
+        The returned function has the same arguments as `compute`. Their last argument is `out`. The function
+        returns None if `compute` does not support the arguments. If the oracle cannot check the robot, the
+        function always returns None.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:

@@ -91,9 +91,10 @@ class _Canvas:
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def draw_labels(self) -> None:
-        """Draw the labels; a label that is too close to an earlier label moves sideways.
+        """Draw the labels.
 
-        Labels of one colour at about the same point are joined: "x_1, x_2".
+        A label that is too close to an earlier label moves sideways. Labels of one colour at about the same
+        point are joined: "x_1, x_2".
         """
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for point, along, text, color in self.labels:
@@ -113,7 +114,7 @@ class _Canvas:
                 position = position + step * side
             occupied.append(position)
             look = {"color": color, "ha": "center", "va": "center", "zorder": 6}
-            # Without this background, lines would make the label illegible.
+            # The background keeps a label legible on lines.
             look["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
             # Labels of x and z axes are formulas, such as $x_1$.
             # Names of joints and frames are plain text, because names may contain "$".

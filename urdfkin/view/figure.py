@@ -37,11 +37,11 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, which they chose for readers with red-green or blue-yellow colour blindness.
+#: Okabe and Ito's colours: readers with red-green or blue-yellow colour blindness can distinguish them.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of crosses: disagreements outside their bound, coordinates outside their limits.
+#: Colour of the crosses for disagreements above the bound and for coordinates outside the limits.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {
@@ -73,7 +73,7 @@ def style(**more: Any) -> Any:
 
 
 def label(name: str) -> str:
-    """Escape unprintable characters in a name for a drawing; XML forbids some unprintable characters."""
+    """Escape unprintable characters in a name, because XML forbids some of them."""
     return escape_unprintable(name)
 
 
@@ -91,7 +91,7 @@ def _matplotlib() -> Any:
 
 
 def figure_bytes(figure: Figure, path: Path) -> bytes:
-    """Return the figure as bytes in the format of `path`'s suffix; equal figures give equal bytes."""
+    """Return the figure as bytes in the format of `path`'s suffix. Equal figures give equal bytes."""
     format_ = path.suffix.removeprefix(".").lower()
     if format_ not in FORMATS:
         raise InputError(
@@ -105,9 +105,9 @@ def figure_bytes(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """Return a figure as an SVG element; `prefix` makes ids unique on the page.
+    """Return a figure as an SVG element.
 
-    The placeholder colours of the figure are replaced as in `PAGE_COLOURS`.
+    `prefix` makes ids unique on the page. `PAGE_COLOURS` replaces the placeholder colours.
     """
     stream = io.StringIO()
     no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))

@@ -44,7 +44,7 @@ class Screen(Protocol):
 
 
 class Player:
-    """The controls of a trajectory; `sample` is the index of the sample that the viewer shows."""
+    """The controls of a trajectory. `sample` is the index of the sample that the viewer shows."""
 
     def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
@@ -141,7 +141,7 @@ class Player:
 
 
 def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
-    """Request a picture up to five times, until the picture differs from `last`.
+    """Request a picture that differs from `last`, with at most five attempts.
 
     A busy browser may return the picture of the previous pose.
     """
@@ -155,7 +155,7 @@ def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
 def as_gif(frames: list[np.ndarray], seconds_per_frame: float) -> bytes:
     """Return an endless animation of frames (height, width, 3 or 4).
 
-    The time of each frame is `seconds_per_frame`, rounded to 0.01 s, and at least 0.02 s.
+    Each frame lasts `seconds_per_frame`, rounded to 0.01 s, but at least 0.02 s.
     """
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 #: A panel draws one diagram, for example the frame's velocity.
-#: Arguments: matplotlib's Axes, the motion, the times (s).
+#: Its arguments are matplotlib's Axes, the motion and the times (s).
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
 #: The dashes of seven lines. The first six lines are distinguishable without colours.
@@ -45,7 +45,7 @@ def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k; the first 21 lines differ in colour or dashes."""
+    """Return the colour and the dashes of line k. The first 21 lines differ in colour or dashes."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
@@ -96,8 +96,7 @@ def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, 
 def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """Draw the disagreement of urdfkin with Pinocchio. Thin lines show the bound on the disagreement.
 
-    The unit is eps * scale, with eps = 2**-52. Each number that urdfkin compares is a sum of terms. The scale
-    is an upper bound on the sum of the absolute values of these terms.
+    The unit is eps * scale (`urdfkin.verify.bounds`).
     """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.unverified_reason is not None:
@@ -109,9 +108,8 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.bound_ratio > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # The plot's vertical axis is logarithmic.
-    # Bounds are about a hundred times the usual disagreement.
-    # Below 1 eps * scale, the axis is linear.
+    # Bounds are about a hundred times the usual disagreement, so the vertical axis is logarithmic.
+    # The axis is linear between 0 and 1 eps * scale.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -164,7 +162,7 @@ def _draw_coordinates(
 
     If no coordinate changes, the panel shows all coordinates in `indices`. If more than
     `_MOST_NAMES` coordinates are drawn, coordinates that are always within their limits are grey. Thin
-    horizontal lines show the finite limits of each coloured coordinate. Grey coordinates have no such lines.
+    horizontal lines show the finite limits of each coloured coordinate.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
@@ -196,8 +194,8 @@ def _draw_coordinates(
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
     """Return an array that is True for each value outside the coordinate's limits.
 
-    A double that is next to a limit still counts as inside. This tolerance covers the rounding of a
-    limit in decimal notation.
+    A double that is next to a limit still counts as inside, because the limit's decimal notation may be
+    rounded.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -215,7 +213,7 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE_SIZE = (7.6, 10.4)
 #: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
-#: Letters per inch in the footer, and in a legend with the font size 6.
+#: Numbers of letters per inch in the footer, and in a legend with the font size 6.
 _LETTERS_PER_INCH, _LEGEND_LETTERS_PER_INCH = 16, 22
 #: Width of the line sample and the gaps in a legend entry. The unit is the width of one letter.
 _HANDLE_LETTERS = 8

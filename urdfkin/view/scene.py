@@ -22,7 +22,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown.
+#: Maximum size (bytes) of a mesh, material or texture file that the viewer shows.
 LARGEST_FILE = 200_000_000
 
 
@@ -31,7 +31,7 @@ def _load_mesh(file: Path) -> Any:
     import trimesh
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
-        """Finds materials and textures: only regular files in the mesh's folder or below it."""
+        """Finds only materials and textures that are regular files in the mesh's folder or a subfolder."""
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -48,7 +48,7 @@ def _load_mesh(file: Path) -> Any:
 def make_mesh(shape: Shape) -> Any | None:
     """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame.
 
-    Return None if the shape has no mesh file, or if the file is unreadable or has no faces.
+    Return None if the shape has no readable mesh file with faces.
     """
     import trimesh
 
@@ -69,7 +69,7 @@ def make_mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape, in the link's frame; a mesh must be readable."""
+    """Return the corners (8, 3) of a box around a shape, in the link's frame. A mesh must be readable."""
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = make_mesh(shape).bounds  # type: ignore[union-attr]
@@ -90,10 +90,10 @@ class Shape:
 
     Attributes:
         kind: "box", "cylinder", "sphere" or "mesh".
-        size: Lengths in metres: (x, y, z) for a box, (radius, length) for a cylinder, (radius,) for a sphere.
-            For a mesh, the scale factors (x, y, z).
-        colour: Red, green, blue and opacity, each from 0 to 1. None: the colours of the mesh file, or
-            `GREY` for an STL file, box, cylinder or sphere.
+        size: Size in m: (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere. A mesh has
+            the scale factors (x, y, z) instead.
+        colour: Red, green, blue and opacity, each from 0 to 1. If the attribute is None, a mesh has the
+            colours of its file. STL files and other shapes are then `GREY`.
     """
 
     link: str

@@ -11,14 +11,15 @@ Four independent measures protect the viewer:
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
 Viser checks neither the Host header nor the Origin header, and has no option for these checks. To start the
-web server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that
-checks each request. To test the checks, this module sends forbidden requests to the running server before
-the viewer shows a robot. If the server accepts one of these requests, `new_server` stops the server. A new
-version of viser can therefore make the viewer fail, but not make the viewer insecure.
+web server, viser calls `websockets.asyncio.server.serve`. While the server starts, this module replaces
+`serve` by a function that adds a check of each request. To test the checks, this module sends forbidden
+requests to the running server before the viewer shows a robot. If the server accepts a forbidden request,
+`new_server` stops the server. A new version of viser can therefore make the viewer fail, but not make the
+viewer insecure.
 
-Every user of the machine can read the command line of the browser. Therefore the command line does not
-contain the address of the viewer. The browser opens a file in a private folder. This file redirects the
-browser to the address.
+Every user of the machine can read the command line of the browser, so this line does not contain the address
+of the viewer. The browser opens a file in a private folder, and this file redirects the browser to the
+address.
 """
 
 from __future__ import annotations
@@ -96,8 +97,8 @@ class RequestFilter:
         """Return the reason why a request is refused, or None if the request is allowed.
 
         `hosts` and `origins` are the values of all Host and Origin headers. `connects` is True if the request
-        opens a WebSocket. Such a request must have an Origin header. A request for the page needs no Origin
-        header.
+        opens a WebSocket. A request for a WebSocket must have an Origin header. A request for the page needs
+        no Origin header.
 
         Example:
             >>> requests = RequestFilter("127.0.0.1", "key")
@@ -150,8 +151,8 @@ def policy(nonce: str, host: str) -> str:
     """Return the Content-Security-Policy header of the viewer's page.
 
     The browser runs only scripts with the nonce. The nonce is random for each page, so a name in a URDF
-    cannot inject a script. The page can connect only to this server. Without this rule, a link with the
-    parameter `?websocket=` could connect the page to another server.
+    cannot inject a script. The page can connect only to this server, even if a link names another server with
+    the parameter `?websocket=`.
     """
     return "; ".join(
         [
@@ -171,18 +172,17 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message of a page for which viser's server keeps a handler: a control has changed.
-#: The handlers of the page's own connection remain too, for example for the camera and for pictures.
+#: Viser's server keeps only the handler of this message from a page: a control has changed.
+#: The page's connection also keeps its own handlers, for example for the camera and for pictures.
 _ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
-#: Viser's script creates another script element.
-#: The second replacement adds the nonce to this script element.
+#: The second replacement adds the nonce to a script element that viser's script creates.
 _NONCE_REPLACEMENTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: Start of the page's head, after which urdfkin's style and script are added.
+#: urdfkin adds its style and script after this start of the page's head.
 _HEAD_START = '<meta charset="utf-8" />'
 _serve_lock = make_fork_safe_lock()
 
@@ -199,10 +199,10 @@ class UnguardedError(UrdfkinError, RuntimeError):
 
 
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Start viser's server with the request filter; `server.address` is the address to open.
+    """Start viser's server with the request filter.
 
-    Raise InputError without viser, or if the server cannot listen on `host`. Raise UnguardedError if the
-    installed viser cannot be secured.
+    `server.address` is the address to open. Raise InputError if viser is missing, or if the server cannot
+    listen on `host`. Raise UnguardedError if the installed viser cannot be secured.
     """
     try:
         import viser
@@ -234,7 +234,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 def _require_usable_address(host: str) -> None:
     """Raise InputError if the server cannot listen on the address `host`.
 
-    Without this check, viser would search for a free port forever.
+    Without this error, viser would search for a free port forever.
     """
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -289,7 +289,7 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD_START) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # urdfkin's style and script run before viser's.
+    # The browser loads urdfkin's style and script before viser's.
     own = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
@@ -327,9 +327,9 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 def _remove_message_handlers(server: Any) -> None:
     """Remove the handlers of viser's server, for example for sharing, uploads and commands.
 
-    The function does not remove the handlers of the messages in `_ACCEPTED_MESSAGES`. Each page's connection
-    has further handlers, which affect only the page's camera, pictures and own controls. urdfkin gives no
-    page its own controls.
+    The function does not remove the handlers of the messages in `_ACCEPTED_MESSAGES`. The connection of each
+    page keeps its own handlers. They affect only the camera, the pictures and the controls of this page.
+    urdfkin creates no control for a single page.
     """
     try:
         websocket_server = server._websock_server
@@ -345,7 +345,7 @@ def _remove_message_handlers(server: Any) -> None:
 
 
 def _test_filter(requests: RequestFilter, port: int) -> None:
-    """Test that the running server returns its page and refuses foreign requests, or raise UnguardedError."""
+    """Raise UnguardedError if the running server does not return its page, or accepts a foreign request."""
     host = requests.address(port).split("/")[2]
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
     websocket = here | {

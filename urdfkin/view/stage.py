@@ -59,7 +59,7 @@ class Ellipsoid:
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
     """Return an arrow for each column of the Jacobian `x.jacobian`.
 
-    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. An arrow shows the
+    `x` is the motion of a frame in one sample, in the reference frame LOCAL_WORLD_ALIGNED. An arrow shows the
     linear part of a column, or the angular part if `angular` is True. A part with a norm of at most 1e-9 has
     no arrow.
     """
@@ -74,8 +74,8 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
     """Return an arrow for each kind of acceleration in `ACCELERATION_KINDS`, and one for their sum.
 
-    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. An acceleration of at
-    most 1e-9 m/s^2 has no arrow.
+    `x` is the motion of a frame in one sample, in the reference frame LOCAL_WORLD_ALIGNED. An acceleration
+    of at most 1e-9 m/s^2 has no arrow.
     """
     parts = np.vstack([x.breakdown.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
@@ -100,9 +100,9 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length 1, scaled for the scene.
 
-    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. `reach` is the
-    robot's size (m). The largest half-length is 0.3 `reach` unless the Jacobian is 0. Each half-length is at
-    least 0.002 `reach`.
+    `x` is the motion of a frame in one sample, in the reference frame LOCAL_WORLD_ALIGNED. `reach` is the
+    robot's size (m). The largest half-length of the ellipsoid is 0.3 `reach` unless the Jacobian is 0. All
+    half-lengths are at least 0.002 `reach`.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -134,8 +134,8 @@ _FOV = np.deg2rad(75.0)
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
     """Return the position of the camera and the point at which the camera looks, both (3,) in m.
 
-    The `points` (n, 3) then fill the picture, except for a margin at the edges. `fov` is the vertical field
-    of view (rad). `aspect` is the width of the picture divided by the height.
+    All `points` (n, 3) are in the picture, with a margin at the edges. `fov` is the vertical field of view
+    (rad). `aspect` is the width of the picture divided by the height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _CAMERA_DIRECTION / np.linalg.norm(_CAMERA_DIRECTION)
@@ -159,8 +159,8 @@ _NORMAL_COLOUR, _OFFSET_COLOUR = (230, 159, 0), (86, 180, 233)
 class Stage:
     """A robot in viser's scene.
 
-    `reach` (m) is the diagonal of a box around the link origins in the neutral configuration; 1 m if the
-    diagonal is 0. `missing` lists the meshes that cannot be shown.
+    `reach` (m) is the diagonal of a box around the link origins in the neutral configuration. If the diagonal
+    is 0, `reach` is 1 m. `missing` lists the meshes that cannot be shown.
     """
 
     def __init__(self, server: Any, robot: Robot) -> None:

@@ -38,13 +38,12 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Joint ranges (rad, m) of at least this size count as unlimited.
-#: Velocity limits (rad/s, m/s) of at least this size count as unlimited too.
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited.
 _UNLIMITED_RANGE = 100.0
 #: Step of a slider for an angle or an angle's derivative, if shown in degrees or radians.
 #: An arrow key changes the angle by one step.
 _STEP_DEGREES, _STEP_RADIANS = 1.0, 0.01
-#: Minimum number of steps of a slider in m, m/s or m/s^2.
+#: Minimum number of steps of a slider for a length or a derivative of a length.
 #: The slider's step is 1, 2 or 5 times a power of ten.
 _MIN_STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
@@ -139,7 +138,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # Without this test, the conversion to degrees could change the last digits of a slider.
+                # An unchanged value is not set again: the conversion to degrees could change its last digits.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -266,7 +265,7 @@ def missing_words(missing: Iterable[Shape]) -> str:
     remedy = (
         "Set `ROS_PACKAGE_PATH` to the folder that contains the packages of the meshes."
         if packages
-        else "Put the files at the paths in the URDF."
+        else "Copy the mesh files to the paths that the URDF names."
     )
     what = f"{len(names)} mesh{'es' if len(names) > 1 else ''} not shown"
     return f"**! {what}**, so the skeleton is shown. {remedy}\n{shown}{more}"
@@ -287,7 +286,7 @@ _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 
 
 class Viewer:
-    """A robot in a browser tab; q (nq,) is the configuration of the sliders, rad and m."""
+    """A robot in a browser tab. `q` (nq,) is the configuration of the sliders, in rad and m."""
 
     def __init__(
         self,

@@ -37,7 +37,8 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, compute_oracle_results, compute_own_results
 
-#: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
+#: A double stores every decimal of 15 digits.
+#: The maximum of 10,000 digits limits the computing time.
 MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
 _round_ends = np.vectorize(interval_ends, otypes=[float, float])
@@ -60,7 +61,7 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower` of each interval.
+        """Width `upper - lower` of each interval.
 
         The width is 0 only if the true value is a double.
         A width above 0 is at least the distance between two neighbouring doubles.

@@ -33,18 +33,18 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Number of decimal digits for a path without joints. A double has 15 decimal digits.
+#: Number of decimal digits for a path without joints.
+#: A double has about 16 digits.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
-#: bits of an interval = ceil(digits * log2(10)) + 5
-#: 15 digits: 50 + 5 = 55 bits
+#: Number of bits in addition to the bits of the decimal digits.
+#: For example, an interval of 15 digits has 50 + 5 = 55 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT_DIGITS = 17
-#: Number of digits of intermediate results in `format_decimal`.
-#: `format_decimal` then rounds the decimal to 17 digits.
+#: Number of digits in `format_decimal` before the result is rounded to 17 digits.
 _INTERMEDIATE_DIGITS = 200
 #: Additional bits of precision for the Newton steps of `nearest_rotation`.
 _NEWTON_BITS = 30
@@ -55,8 +55,9 @@ _precision_lock = make_fork_safe_lock()
 def enough_digits(joint_count: int) -> int:
     """Return the number of decimal digits for intervals on a path with `joint_count` joints.
 
-    With this number, an interval is narrower than the last digit of a double: one more digit makes an
-    interval ten times narrower, and a joint with an oblique axis makes an interval about twice as wide.
+    With this number, an interval is narrower than the last digit of a double. A joint with an oblique axis
+    makes an interval about twice as wide. The digit that each joint adds makes the interval ten times
+    narrower.
     """
     return _BASE_DIGITS + joint_count
 
@@ -65,7 +66,7 @@ def enough_digits(joint_count: int) -> int:
 def precision(digits: int) -> Iterator[None]:
     """Compute with `digits` decimal digits inside a `with` block.
 
-    Other threads wait, because Arb has one global precision.
+    Arb has one global precision, so only one thread at a time can execute such a block.
     """
     with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
@@ -95,11 +96,11 @@ def _round_outward(end: arb, towards: float) -> float:
 
 
 def format_decimal(x: Number, negligible: float) -> str | None:
-    """Return an interval's midpoint as a decimal of 17 digits.
+    """Return an interval's midpoint as a decimal of 17 digits, or None if the interval is too wide.
 
-        radius <= 1e-20 |midpoint|, otherwise None
-        |decimal - true value| <= 0.501 units of the last digit
-        interval contains 0: "0" if radius <= 1e-10 negligible, otherwise None
+    The radius of the interval must be at most 1e-20 |midpoint|. The decimal then differs from the true value
+    by at most 0.501 units of the last digit. An interval that contains 0 returns "0" if its radius is at most
+    1e-10 `negligible`.
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
@@ -199,7 +200,7 @@ _FIRST_QUATERNION_VERSION = (1, 1)
 
 @dataclass(frozen=True, slots=True)
 class ExactJoint:
-    """A joint's numbers, computed from the decimal numbers of the URDF text.
+    """The numbers of a joint, from the exact decimals of the URDF text.
 
     By default, the numbers are intervals.
 
@@ -207,8 +208,8 @@ class ExactJoint:
         R: Rotation in the parent link.
         p: Origin in the parent link, m.
         axis: Unit vector in the joint frame.
-        multiplier: 1 without a mimic rule.
-        offset: 0 without a mimic rule.
+        multiplier: Multiplier of the mimic rule, or 1.
+        offset: Offset of the mimic rule, or 0.
     """
 
     R: Matrix
@@ -290,7 +291,7 @@ class _ExactText:
         return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
     def resolve_rule(self, name: str) -> tuple[Number, Number]:
-        """Return M and C of the joint value M q + C."""
+        """Return M and C: the joint's value is M q + C, with q of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -355,8 +356,8 @@ class _ValueBound(NamedTuple):
 
     Attributes:
         scaled_coordinate: |M q|.
-        offset: Sum of |c| over the terms c of C.
-        error: Rounding error in eps, if the rules are applied one after the other.
+        offset: Sum of the absolute values of the terms of C.
+        error: Rounding error, in eps, of a program that applies the rules one after the other.
     """
 
     scaled_coordinate: Any

@@ -29,9 +29,8 @@ from urdfkin.verify.oracle import BaseMotionLike
 
 _RECURSION = Recursion(equations)
 
-#: Axis of each velocity of a planar or floating joint.
-#: First entry: 0, 1 or 2 for the x-, y- or z-axis of the child link.
-#: Second entry: True for an angular velocity.
+#: Axis and type of each velocity of a planar or floating joint.
+#: A pair contains the index of an axis of the child link (0 for x), and True for an angular velocity.
 _VELOCITY_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -130,8 +129,8 @@ def acceleration_values(motion: ExactMotion, link: int, reference: Reference) ->
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the spatial acceleration of a link.
 
-    linear = acc - w x vel
-    in WORLD, at the world origin: linear - alpha x p
+    At the link's origin, the linear part is acc - w x vel. At the world's origin (WORLD), it is
+    acc - w x vel - alpha x p.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
