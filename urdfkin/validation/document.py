@@ -34,12 +34,12 @@ ReferenceName = Literal["local", "world", "local_world_aligned"]
 
 
 class ReportedLimit(TypedDict):
-    """Limits of a joint; null: no limit."""
+    """Limits of a joint. A missing limit is null."""
 
-    lower: Annotated[float | None, doc("Lower position limit, rad or m; null: no limit.")]
-    upper: Annotated[float | None, doc("Upper position limit, rad or m; null: no limit.")]
-    velocity: Annotated[float | None, doc("Limit of the joint velocity, rad/s or m/s; null: no limit.")]
-    effort: Annotated[float | None, doc("Limit of the joint torque or force, N m or N; null: no limit.")]
+    lower: Annotated[float | None, doc("Lower position limit, rad or m.")]
+    upper: Annotated[float | None, doc("Upper position limit, rad or m.")]
+    velocity: Annotated[float | None, doc("Limit of the joint velocity, rad/s or m/s.")]
+    effort: Annotated[float | None, doc("Limit of the joint torque or force, N m or N.")]
 
 
 class ReportedMimic(TypedDict):
@@ -47,11 +47,11 @@ class ReportedMimic(TypedDict):
 
     mimicked_joint: Annotated[str, doc("Name of the mimicked joint.")]
     multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
-    offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
+    offset: Annotated[float, doc("Offset of the rule, rad or m.")]
 
 
 class ReportedRange(TypedDict):
-    """Range of a mimicked joint, reduced by the limits of mimic joints."""
+    """Range in which a mimicked joint keeps its mimic joints within their limits."""
 
     lower: Annotated[float | None, doc("Lower end, rad or m; null if the range is empty or a single value.")]
     upper: Annotated[float | None, doc("Upper end, rad or m; null if the range is empty or a single value.")]
@@ -296,9 +296,9 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Two comparisons: urdfkin with a second oracle, and Pinocchio with the second oracle.
+    """Comparisons of urdfkin and of Pinocchio with a second oracle.
 
-    The entry exists only if there is a second oracle.
+    Without a second oracle, the document has no such entry.
     """
 
     by: Annotated[str, doc("Name of the second oracle: mujoco.")]
@@ -353,7 +353,7 @@ class ReportedCheck(TypedDict):
 
 
 class ReportedTimings(TypedDict):
-    """Computing times in seconds, summed over processes."""
+    """Sums of the computing times of all processes, in seconds."""
 
     read: Annotated[float, doc("Time of reading the file, and of building the models and tables.")]
     urdfkin: Annotated[
@@ -429,8 +429,8 @@ class ReportedRobot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    A release may add entries without a new version of the layout. If a release removes an entry or changes
-    the meaning of an entry, the layout gets a new version.
+    The version of the layout changes if a release removes an entry or changes its meaning. A release may add
+    entries without a new version of the layout.
     """
 
     started: Annotated[str, doc("Start time of the validation, ISO 8601, UTC.")]
