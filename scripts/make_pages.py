@@ -184,7 +184,7 @@ def make_accuracy_parts() -> dict[str, str]:
 def format_studies(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
     lines = [line for study in studies.values() for line in as_json_data(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
-    inputs = f"{SAMPLES} samples of each robot (seed 0) and every link, with Pinocchio {version()}"
+    inputs = f"{SAMPLES} samples of each robot (seed 0), all links, and Pinocchio {version()}"
     counts = f"""The study used {inputs}.
 Each line of the tables below compares the typical errors of urdfkin and Pinocchio:
 {more_accurate_counts(lines)}. Equal errors are
