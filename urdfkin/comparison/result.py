@@ -91,8 +91,8 @@ class Interval:
         upper: Proven upper bound of the distance, m; inf without a bound.
         radians: Proven upper bound of the angle between the frames, rad; inf without a bound.
         radians_seen: Angle between the frames at `q_a` and `q_b`, rad.
-        q_a: Configuration of A with the largest distance found. If `lower` is 0, it can be the configuration
-            with the largest angle. Empty if the frames do not differ.
+        q_a: Configuration of A with the largest distance found. If `lower` is 0, `q_a` can be the
+            configuration with the largest angle. Empty if the frames do not differ.
         q_b: The corresponding configuration of B.
     """
 
@@ -334,8 +334,8 @@ class Sameness(Displayable):
         orders: Each entry lists consecutive joints of B in a new order, which does not affect the motion.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The identity if the roots
             coincide.
-        base_links: A link of A and a link of B, on matching rigid bodies. All poses of A are relative to the
-            first link, and all poses of B to the second link.
+        base_links: A link of A and a link of B, on matching rigid bodies. The comparison uses poses relative
+            to these two links.
         rounding: (m, rad) largest distance and angle that rounding errors can cause between matching frames.
         unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
             distances assume that no joint in this list travels more than 10 m.
@@ -345,8 +345,8 @@ class Sameness(Displayable):
             link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`. Empty if
             `same` was called with `bounds=False`.
-        as_written: Interval of the two frames with the largest distance between the unchanged models. None if
-            `after` is empty, if no frames can be compared, or if `bounds` is False.
+        as_written: Interval of the two frames with the largest distance found between the unchanged models.
+            None if `after` is empty, if no frames can be compared, or if `bounds` is False.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. If `after` is not empty, a comparison with a
             Denavit-Hartenberg table uses only frames with equal names in A and B.
@@ -580,7 +580,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with `Sameness.to_b`; a convention cannot convert poses of a joint",
+                    remedy="convert q with `Sameness.to_b`; a convention cannot convert the joint's pose",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)

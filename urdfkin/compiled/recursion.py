@@ -320,7 +320,7 @@ def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row
     """Read whole blocks of eight numbers, which is faster.
 
     For example, if q has 6 coordinates, the function may read 8 numbers. The last two numbers go to the
-    scratch rows of v, which are filled later.
+    scratch rows of v. If the recursion needs v, these rows are overwritten later.
     """
     for i in range(begin, end):
         at = blocks[i]

@@ -217,7 +217,7 @@ class PairWithReference:
         """Value of z (m) in this joint's frame where a Hayati row's x axis intersects the joint's axis.
 
         With this value, the cell a equals the reference. The value is None if the axes are parallel in the
-        path or in the reference, or if it exceeds the reach.
+        path or in the reference, or if the absolute value exceeds the reach.
 
             p: origin of the next joint's frame
             t: unit vector along the projection of the next axis onto the xy plane
@@ -305,7 +305,7 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
         # Of the rows i to end - 1, the code selects the row with the most tilted axes. If this is a Hayati
-        # row, d of row i makes its cell a equal to the reference.
+        # row, d of row i is chosen so that the Hayati row's cell a equals the reference.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:

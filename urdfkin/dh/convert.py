@@ -2,10 +2,12 @@
 
 `urdfkin.dh.table` defines the conventions and the factors X.
 
-| New convention | New base or tool | Exception |
+| New convention | New base or tool | Part of a row |
 |---|---|---|
-| modified | new tool = X_n . tool | a base Tx(a) Rx(alpha) becomes part of the first row |
-| standard | new base = base . X_1 | a tool Tx(a) Rx(alpha) becomes part of the last row |
+| modified | new tool = X_n . tool | a base Tx(a) Rx(alpha) becomes a and alpha of the first row |
+| standard | new base = base . X_1 | a tool Tx(a) Rx(alpha) becomes a and alpha of the last row |
+
+If base or tool becomes part of a row, the new base or tool is the identity.
 
 In a tree, the frame of joint i is the Denavit-Hartenberg frame with the joint's axis as its z axis: frame
 i - 1 of a standard table, or frame i of a modified table.

@@ -42,7 +42,7 @@ TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: A comparison corrects the differing cells, and computes the remaining tip error.
-#: It reports the cells if the remaining tip error is at most this fraction of the tip error before.
+#: It reports the cells if the correction reduces the tip error to at most this fraction.
 #: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
 _MAX_CELLS_ERROR_FRACTION = 0.5
 #: If a table does not agree with the URDF, urdfkin searches for a mistake in the table.

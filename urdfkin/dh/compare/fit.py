@@ -266,8 +266,8 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         cell_derivatives = cell_derivatives * mask.ravel()
         free_derivatives = free_derivatives if free else np.zeros_like(free_derivatives)
         cells = _sparse_changes(model, start, free_derivatives, cell_derivatives, error, scale)
-        # If two axes nearly coincide, only the sum of their offsets has a clear effect on the tip.
-        # The cutoff rcond prevents large changes of the two offsets with opposite signs.
+        # If two axes nearly coincide, large changes of the two offsets can cancel at the tip.
+        # The cutoff rcond prevents such changes.
         offsets = np.linalg.lstsq(free_derivatives, error - cell_derivatives @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
@@ -399,7 +399,7 @@ def start_models(
 def _fit_translations(model: TableArrays, targets: TargetPoses) -> TableArrays:
     """Fit the offsets of prismatic joints and the translations of base and tool.
 
-    The position of the tip is linear in offsets and translations, so one step gives the exact fit.
+    The position of the tip is linear in these offsets and translations, so one step gives the exact fit.
     """
     poses, derivatives, _ = tip_poses_and_derivatives(model, targets)
     translations = np.concatenate([np.tile([True, True, True, False, False, False], 2), model.turns == 0.0])

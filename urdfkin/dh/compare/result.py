@@ -234,8 +234,8 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether both limits are finite, and lower < upper.
 
-    If the limits are equal, poses do not show the joint's direction of motion. A URDF without limits sets
-    both limits to 0.
+    If the limits are equal, poses do not show the joint's direction of motion. If a URDF omits the limits,
+    both are 0.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
