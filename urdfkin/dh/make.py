@@ -121,7 +121,7 @@ def make_dh_table(
         near_parallel: "hayati": nearly parallel axes have a fifth parameter, beta. "strict": each row has
             only four parameters; offsets of kilometres are possible.
         snap: Tolerance, rad. An angle becomes a multiple of 15 degrees if it changes by at most `snap`. The
-            table's attribute `snap` reports the effect.
+            table's attribute `snap` lists these angles, and bounds of the effect on the tip.
         last: "tip": the last row ends at the tip if possible. "flange": the last row ends on the last joint's
             axis, and the tool leads from this axis to the tip.
         parallel_offset: Selects the rows for the offsets d along consecutive parallel axes. "last": the row
@@ -143,8 +143,8 @@ def make_dh_table(
             "minimal" equals "drawn".
         like: A published table. The result copies the positive joint directions, the directions of the x axes
             and the offsets d along parallel axes. It also copies theta of the first and last row, and the
-            last a and alpha of a standard table. Base and tool are adjusted to the copied cells. All other
-            numbers come from the URDF. With `like`, the options `last`, `parallel_offset`, `flip`, `first`
+            last a and alpha of a standard table. Base and tool are adjusted to the copied cells. The URDF
+            determines all other numbers. With `like`, the options `last`, `parallel_offset`, `flip`, `first`
             and `sign` must have their default values.
 
     Raises:
