@@ -56,10 +56,10 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: The models are equivalent if changes of these kinds make B equal to A.
-#: The printed verdict lists the kinds in this order.
+#: Kinds of changes to B. The models are equivalent if such changes make B equal to A.
+#: The order is that of the printed verdict.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
-#: Kinds of differences for which the distance between matching frames has an upper bound.
+#: For these kinds of differences, `same` computes an upper bound of the distance between matching frames.
 BOUNDED_DIFFERENCE_KINDS = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
@@ -70,7 +70,7 @@ class SameQuestion:
     Attributes:
         within: Limit (m and rad) for `Sameness.within`. If `within` is None, the verdict must not be
             `Verdict.DIFFERS`.
-        strict: Whether remarks and the verdict `Verdict.SAME_AFTER` are forbidden.
+        strict: Whether the condition fails for remarks, and for the verdict `Verdict.SAME_AFTER`.
     """
 
     within: float | None = None
@@ -86,12 +86,13 @@ class Interval:
     Attributes:
         frame: The link of A.
         frame_b: The link of B.
-        lower: Lower bound of the largest distance, m: the distance at `q_a` and `q_b`, minus rounding errors.
+        lower: Lower bound of the largest distance, m. It equals the distance at `q_a` and `q_b`, minus
+            rounding errors.
         upper: Proven upper bound of the distance, m; inf without a bound.
         radians: Proven upper bound of the angle between the frames, rad; inf without a bound.
-        radians_seen: Angle between A's frame at `q_a` and B's frame at `q_b`, rad.
-        q_a: Configuration of A with the largest distance found. If `lower` is 0, the angle can be the largest
-            instead. Empty if the frames do not differ.
+        radians_seen: Angle between the frames at `q_a` and `q_b`, rad.
+        q_a: Configuration of A with the largest distance found. If `lower` is 0, `q_a` can be the
+            configuration with the largest angle. Empty if the frames do not differ.
         q_b: The corresponding configuration of B.
     """
 
@@ -120,14 +121,14 @@ class Difference:
     """One difference between two models.
 
     Attributes:
-        place: The joint or link of A, for example "joint elbow"; of B if only B has it.
+        place: The joint or link, for example "joint elbow". The name is A's, unless only B has the joint.
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         a: The parameter's value in A; None if A has no value.
         b: The parameter's value in B; None if B has no value.
         radians: Angular part of the difference, rad.
         metres: Linear part of the difference, m.
-        detail: "alone": the axis differs, but the links after the joint agree. "converted": the limits of B
-            are in A's coordinate. Otherwise empty.
+        detail: "alone" if the axis differs, but the links after the joint agree. "converted" if the limits
+            of B were converted to A's coordinate. Otherwise empty.
     """
 
     place: str
@@ -140,7 +141,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The values in A and B as numbers or texts; None for no value, a mimic rule and link names."""
+        """The values in A and B as numbers or texts. Mimic rules and link names give None."""
         if self.what == "limits":
             return _format_range(self.a), _format_range(self.b)
         if self.what == "idle":
@@ -222,7 +223,7 @@ def _format_range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference that rounding does not explain.
+    """A difference between two joints or links that is larger than rounding errors.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
@@ -230,7 +231,7 @@ class JointDifference:
             models cannot be compared at this joint or link.
         a: The parameter's value in A; None if `b` is a description.
         b: The parameter's value in B, or a description in words.
-        explained: The largest difference that rounding can cause, as text; empty if no number is rounded.
+        explained: Text of the largest difference that rounding can cause. Empty if no number is rounded.
     """
 
     place: str
@@ -292,11 +293,13 @@ class Confirmation:
 class JointMap:
     """A joint of A and the matching joint of B.
 
+    This formula converts the joint value:
+
         value in B = sense * (value in A) + offset
 
     Attributes:
         sense: 1 or -1; 1 for planar and floating joints.
-        offset: rad or m; 0 for planar and floating joints.
+        offset: Offset in rad or m; 0 for planar and floating joints.
         conversion: Conversion of a planar or floating joint's pose from A to B; None without a conversion.
     """
 
@@ -318,37 +321,37 @@ class Sameness(Displayable):
         sources: For A and B: a path, a catalogue name, or a label such as `<text>`.
         digests: For A and B: SHA-256 of the URDF text, or of the MJCF or USD file.
         verdict: `Verdict.SAME`, `SAME_AFTER` (after the changes in `after`), `UP_TO_SINGLE`, or `DIFFERS`.
-        after: The changes that bring B closest to A, one line each. The models may differ even after these
-            changes.
+        after: Changes that reduce the differences between B and A as far as possible, one line each. The
+            models may still differ after the changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
-        differences: The differences, ordered from the base to the tips. Last are joints of only one model,
-            and links that different joints carry.
+        differences: The differences, ordered from the base to the tips. Joints of only one model and links
+            that different joints carry come last.
         remarks: Differences without effect on motion, for example joint limits, joint types, and links of
             only one model.
-        joints: The matched joints of A and B.
-        links: The matched links of A and B.
-        tools: Matched links that `same` reports as different tools.
+        joints: Pairs of matching joints of A and B.
+        links: Pairs of matching links of A and B.
+        tools: Pairs of matching links that `same` reports as different tools.
         orders: Each entry lists consecutive joints of B in a new order, which does not affect the motion.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The identity if the roots
             coincide.
-        base_links: A link of A and a link of B, on matching rigid bodies. The poses of A and B are compared
-            relative to these links.
+        base_links: A link of A and a link of B, on matching rigid bodies. The comparison uses poses relative
+            to these two links.
         rounding: (m, rad) largest distance and angle that rounding errors can cause between matching frames.
         unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
-            distances hold while each of these joints travels at most 10 m.
+            distances assume that no joint in this list travels more than 10 m.
         single: (m, rad) largest distance and angle that single precision can cause between matching frames.
             None if no file has single precision.
         unexplained: Differences between the unchanged models that rounding does not explain, by joint or
             link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`. Empty if
             `same` was called with `bounds=False`.
-        as_written: Interval of the frame with the largest distance found. The changes in `after` are not
-            applied. None if `after` is empty, if no frames can be compared, or with `bounds=False`.
+        as_written: Interval of the two frames with the largest distance found between the unchanged models.
+            None if `after` is empty, if no frames can be compared, or if `bounds` is False.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
-            unchanged models. Infinite if no bounds were proven. If A or B is a Denavit-Hartenberg table and
-            `after` is not empty, only frames with equal names in A and B are compared.
-        narrowed: One line for each mimicked joint whose range exceeds the limits of its mimic joints. The
-            distances in `frames` are computed for the whole range of the mimicked joint.
+            unchanged models. Infinite if no bounds were proven. If `after` is not empty, a comparison with a
+            Denavit-Hartenberg table uses only frames with equal names in A and B.
+        narrowed: One line for each mimicked joint with a range that violates the limits of its mimic joints.
+            The distances in `frames` are computed for the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
 
@@ -401,9 +404,10 @@ class Sameness(Displayable):
 
     @property
     def worst(self) -> Interval | None:
-        """The interval with the largest upper bound; None if no frame differs by more than rounding.
+        """The element of `frames` with the largest upper bound.
 
-        If upper bounds are equal, the lower bounds are compared, and then the bounds on the angle.
+        The result is None if all distances and angles are within rounding errors. If upper bounds are equal,
+        `lower` decides. If `lower` is equal too, `radians` decides.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -419,9 +423,9 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval of the frame that differs most between the unchanged models.
+        """The interval of the largest distance between the unchanged models, at equal joint values.
 
-        A and B are compared at equal joint values. If `as_written` is None, the result is `worst`.
+        If `as_written` is None, the result is `worst`.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -447,8 +451,8 @@ class Sameness(Displayable):
         """Whether single precision can explain the displacement of every frame.
 
         The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
-        wrong number can also cause a displacement below the limit. Therefore, only `up_to_single` proves
-        that rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
+        small wrong number in a file can also cause a displacement below the limit. Only `up_to_single`
+        proves that rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -466,11 +470,10 @@ class Sameness(Displayable):
     def within(self, most: float) -> bool:
         """Return whether all matching frames are proven to be within `most` (m and rad).
 
-        The models are compared without the changes in `after`, at equal coordinates. A root coincides with
-        the other model's link of the same name, if this link is on the root body; otherwise, the roots
-        coincide. Different base poses, tool frames and joint zeros can therefore increase the distance. The
-        result is False if `differences` contains a kind outside `BOUNDED_DIFFERENCE_KINDS`, such as "only in
-        A".
+        The unchanged models are compared at equal coordinates. Different base poses, tool frames and joint
+        zeros can therefore increase the distance. A root coincides with the other model's link of the same
+        name, if this link is on the root body. Without such a link, the two roots coincide. The result is
+        False if `differences` contains a kind outside `BOUNDED_DIFFERENCE_KINDS`, such as "only in A".
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -497,7 +500,7 @@ class Sameness(Displayable):
         """Return 0 if the condition `SameQuestion(within, strict)` holds, else 1.
 
         Args:
-            strict: Whether to return 1 also for remarks and the verdict `Verdict.SAME_AFTER`.
+            strict: Whether remarks and the verdict `Verdict.SAME_AFTER` also give 1.
             within: Largest allowed distance (m) and angle (rad) between frames of the unchanged models.
 
         >>> import urdfkin
@@ -510,8 +513,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
-        If the models are equivalent, link poses at both configurations differ only by `base` and `tools`.
-        Coordinates that only B has are neutral.
+        For equivalent models, the link poses of A at q and of B at the result differ only by `base` and
+        `tools`. Coordinates that only B has are neutral.
 
         Raises:
             InputError: q does not have A's length, or is not finite.
@@ -543,7 +546,7 @@ class Sameness(Displayable):
     def convention(self) -> Convention:
         """Return a convention that converts A's coordinates to B's.
 
-        In this convention, A's joints have the names, order, directions and zeros of B's joints.
+        The convention gives A's joints the names, order, directions and zeros of B's joints.
         `robot_a.convention(found.convention())` converts q, v, a and Jacobians. For equivalent
         models, the link poses at q and at the converted q differ only by `base` and `tools`.
 
@@ -577,7 +580,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with `Sameness.to_b`; a convention cannot describe this difference",
+                    remedy="convert q with `Sameness.to_b`; a convention cannot convert the joint's pose",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
@@ -654,13 +657,10 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 
 
 def changes_of_b(alignment: Alignment, rounding: Tolerance) -> tuple[tuple[str, str], ...]:
-    """Return the changes that bring B closest to A.
+    """Return the kind and the text of each change in `Sameness.after`.
 
-    The function stores the tool poses in `alignment`. If A or B is a Denavit-Hartenberg table, every
-    displaced frame is reported as a tool, because the frames of a table depend on the table's convention.
-
-    Returns:
-        (kind, text) of each change.
+    The function stores the tool poses in `alignment`. Every displaced frame of a Denavit-Hartenberg table
+    counts as a tool, because the table's convention determines the frames.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -785,8 +785,8 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 
 def _are_fixed_end_links(alignment: Alignment, frame: FramePair) -> bool:
-    # `same` may treat a mimic joint as a fixed joint, if the multiplier is 0.
-    # The child link of this fixed joint is not treated as a tool.
+    # `same` treats some mimic joints with multiplier 0 as fixed joints.
+    # The child link of such a joint is not a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle_joint_lock(tree.joints[link - 1]):
             return False
@@ -864,7 +864,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _tilt_and_shift(pair: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m), each 0 within the tolerance `rounding`."""
+    """Return the tilt (rad) and the shift (m). Values within the tolerance `rounding` become 0."""
     return (
         pair.tilt if pair.tilt > rounding.angle else 0.0,
         pair.shift if pair.shift > rounding.distance else 0.0,
@@ -928,9 +928,9 @@ def limit_differences(
     Args:
         a: The joint of A.
         b: The joint of B.
-        tolerance: Relative tolerance; absolute if both values are below 1.
+        tolerance: Relative tolerance. For two values below 1, it is an absolute tolerance.
         single_roundoff: Relative rounding error of single precision; 0 for double precision.
-        zero: (sign, offset); value in B = sign * (value in A) + offset.
+        zero: (sign, offset) of the conversion of joint values: value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

@@ -84,12 +84,10 @@ def same(
     The pose of a link is a product of exponentials:
 
         T(q) = exp(S_1 q_1) ... exp(S_n q_n) H
-        S_i: screw of joint i
-        H: pose of the link in the zero configuration
 
-    Two models with equal screws S_i and equal poses H move alike for all q. The models may still differ in
-    names, coordinate order, fixed links and base pose. Joint zeros, joint directions and tool frames may also
-    differ.
+    S_i is the screw of joint i. H is the pose of the link in the zero configuration. Two models with equal
+    screws and equal poses H move alike for all q. The models may still differ in names, coordinate order,
+    fixed links and base pose. Joint zeros, joint directions and tool frames may also differ.
 
     Args:
         a: A robot, or a source for `load`.
@@ -99,7 +97,7 @@ def same(
         bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
             most of the time.
         boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
-            bounds if the models differ in many places. With 0, no boxes are used.
+            bounds if the models differ in many places. The value 0 turns off branch and bound.
         within: Limit (m and rad) for `Sameness.within`. If `Sameness.after` is not empty, branch and bound
             tries to prove this limit for the distances of all matching frames.
 
@@ -216,7 +214,7 @@ class Comparator:
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
-        """Return the result without intervals; store the tool frames in `alignment`."""
+        """Return the verdict and the differences. The function also stores the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         changes = changes_of_b(alignment, self.tolerance)
@@ -454,8 +452,8 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_REFINED_FRAMES]]
-        # If all sampled distances are within rounding, the search uses only one frame.
-        # This frame has the largest upper bound on the angle.
+        # If all sampled distances are within rounding, the search uses only the frame with the largest
+        # upper bound on the angle.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -603,10 +601,11 @@ def _is_idle_mimic_joint(joint: Joint) -> bool:
 def _match_usd_spellings(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Match names of a USD model and of another model that USD spells differently.
+    """Match the names of a USD model and of another model, because USD changes the spelling of names.
 
     Returns:
-        Link names of both robots, in the other model's spelling; joint names of A, each with the name in B.
+        The link names of A and B, in the spelling of the model that is not USD; and a dict from joint names
+        of A to joint names of B.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -658,7 +657,7 @@ class JointComparison:
     """Prove joint by joint that single precision causes every difference.
 
     The rounding errors of all joints add up in a frame's pose. A comparison of frame poses can therefore miss
-    a small wrong number. For this reason, each joint may differ only by the rounding of its own numbers.
+    a small wrong number. `JointComparison` allows each joint only the rounding errors of its own numbers.
 
     **Compared quantities.** Two files can describe the same joint by different frames, and can have different
     fixed links. The compared quantities do not depend on these choices:
@@ -716,18 +715,18 @@ class JointComparison:
     - The path from P to the link has at most one moving joint.
     - In the second model, the joints from C to P have no rounded numbers.
 
-    **Limits of the proof.** A difference above its bound has another cause. A difference below its bound can
-    be rounding or a wrong number. The proof has three conditions:
+    **Limits of the proof.** A difference above the bound of its joint has another cause than rounding. A
+    wrong number can also cause a difference below the bound. The proof has three conditions:
 
     - In A and in B, the same moving joints lead from P to the link, in the same order.
     - A planar or floating joint is attached to the root body, and is the only joint from P to the link.
     - The frames of a planar or floating joint agree in A and B up to double precision.
 
-    If a condition does not hold for a link, `same` reports this link as not explained.
+    If a link violates one of these conditions, `same` reports the link as not explained.
 
     Args:
-        errors: For A, and for B: (joints, 3) bounds on the errors of position (m), rotation (rad) and mimic
-            rule (relative); 0 for double precision.
+        errors: Two (joints, 3) arrays, for A and for B. The columns are error bounds of position (m),
+            rotation (rad) and mimic rule (relative). The bounds are 0 for double precision.
         base: (4, 4) pose of B's root in A's root frame.
     """
 
@@ -770,7 +769,7 @@ class JointComparison:
     def places_in_second_model(self) -> dict[str, str]:
         """Map each matched link and joint of the first model, for example "joint j", to its match.
 
-        A fixed joint is mapped to the joint before the link that matches its child link.
+        Fixed joints match if their child links match.
         """
         a, b = self.trees
         places = {f"link {a.links[link]}": f"link {b.links[other]}" for link, other in self.pairs.items()}
@@ -782,9 +781,9 @@ class JointComparison:
         return places
 
     def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
-        """Return P, the nearest ancestor that is a common link, and the joints from P to a link.
+        """Return P and the joints from P to a link. P is the nearest ancestor that is a common link.
 
-        If no ancestor is a common link, P is A's link in `start`.
+        If no ancestor is a common link, P is `start[0]`.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -814,8 +813,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
-        # P and the link have a last common ancestor in B.
-        # The list `paths[1][0]` contains the joints from this ancestor to P.
+        # `paths[1][0]` contains the joints from the last common ancestor (C in the docstring) to P in B.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(
                 name, "", None, "the joints between this link and the nearest common link cannot be compared"
@@ -838,8 +836,7 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A wrong link origin also shifts the joint axis in the frame of P.
-            # Therefore, the axes are compared in the link's frame.
+            # A wrong link origin also shifts the joint axis in the frame of P, but not in the link's frame.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(
@@ -852,7 +849,8 @@ class JointComparison:
     def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
         """Return the angle (rad) and the distance (m) between two axes.
 
-        The distance is that of one joint's origin from the other joint's axis; 0 for a prismatic joint.
+        The distance is measured from one joint's origin to the other joint's axis. It is 0 for a prismatic
+        joint.
         """
         ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
@@ -868,7 +866,8 @@ class JointComparison:
             path: Joints from C to the link.
 
         Returns:
-            For each joint of `path`, the screw and error bounds (m, rad); the pose; the pose's error bounds.
+            A dict from each joint of `path` to its screw and error bounds; the link pose; and the error
+            bounds of this pose. Error bounds are two numbers, in m and rad.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

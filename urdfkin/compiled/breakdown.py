@@ -62,7 +62,7 @@ class AccelerationBreakdown(Displayable):
 
     Attributes:
         joints: Moving joints from the base to the frame.
-        base: (..., 6) part of the acceleration due to the base's motion.
+        base: (..., 6) acceleration that the base's motion alone causes.
         terms: (..., joints, 4, 6) contributions; `ACCELERATION_KINDS` names the four kinds.
     """
 

@@ -61,7 +61,7 @@ _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V,
 
 
 class EvaluateOptions(TypedDict, total=False):
-    """Keyword arguments of `placements`, `velocities` and the similar functions.
+    """Keyword arguments of the functions that compute a batch, such as `placements`.
 
     Attributes:
         base: State of the base, (n, 24) or (1, 24).
@@ -182,8 +182,8 @@ def _compute_interpreted(
 ) -> int | None:
     """Compute a batch without a kernel.
 
-    Return None if a kernel must compute the batch. Otherwise, return 1 if an input is nan, inf or too
-    large, and 0 if not.
+    Return 0 for valid inputs, and 1 if an input is nan, inf or too large. Return None if a kernel must
+    compute the batch.
     """
     if preload.get_kernel(name) is not None:
         return None
@@ -290,7 +290,7 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
 _MIN_THREADED_ROWS = 4096
 
 #: Number of configurations that NumPy computes at a time.
-#: Their intermediate results fit into the cache.
+#: The intermediate results of so many configurations fit into the cache.
 ROWS_PER_PART = 2048
 
 #: A function that computes rows of `out` from rows of `inputs`.
@@ -337,7 +337,7 @@ def compute_in_threads(
 def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows in parts to limit memory.
 
-    If n is 0, `compute` gets an empty slice.
+    If n is 0, the function calls `compute` once, with an empty slice.
     """
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
     parts = [slice(i, min(i + ROWS_PER_PART, n)) for i in range(0, max(n, 1), ROWS_PER_PART)]

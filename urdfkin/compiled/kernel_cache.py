@@ -20,9 +20,8 @@ from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
 #: Lock for the import of Numba and for compilations.
 #: A fork waits for this lock, because a child cannot finish the parent's compilation.
-#: A fork acquires locks in the reverse order of their creation.
-#: The import of Numba acquires this lock before `logging`'s lock.
-#: Therefore, import `logging` before the creation of this lock.
+#: The import of Numba acquires this lock before `logging`'s lock. A fork acquires the newest lock first.
+#: For the same order, this lock must be newer, so `logging` is imported before the lock is created.
 compile_lock = make_fork_safe_lock()
 
 #: A function that receives a kernel's name and compile time (s).

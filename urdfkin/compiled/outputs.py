@@ -1,8 +1,8 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-The state of a link consists of vectors. A function `state_for_...` marks the vectors that an output does not
-need. Jacobian columns are computed in world axes. For LOCAL, the columns are rotated to the axes of the
-frame.
+The state of a link consists of vectors. The functions `state_for_...` replace the vectors that an output does
+not need by `unused()`. Jacobian columns are computed in world axes. For LOCAL, the columns are then rotated
+to the frame's axes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: Scratch rows of the 16 elements of a pose, and of the six numbers of a velocity or an acceleration.
+#: A pose has 16 elements, and a velocity or an acceleration has six numbers.
+#: These arrays list the scratch row of each number.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -110,7 +111,7 @@ def write_matrix(m, scratch, program, frame, sources, start, reference, state, t
 
 
 def store_no_axis(scratch, row, axis, state):
-    """Do nothing: this output has no Jacobian columns."""
+    """Do nothing, for outputs without Jacobian columns."""
 
 
 def write_no_column(scratch, row, to, flags, constants, multiplier_index, reference, state): ...

@@ -39,7 +39,7 @@ class JointMotion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """First column of each part of `CompiledTree.geometry`.
+    """Columns of `CompiledTree.geometry`; for an array, its first column.
 
     Attributes:
         R: Rotation matrix from this joint's axes to the previous moving joint's axes, row by row.
@@ -102,9 +102,9 @@ class CompiledTree:
     | depth | (frames,) | number of URDF joints from the root, in output order |
     | tilts | (frames,) | sum of `Joint.pinocchio_tilt` (rad) over these URDF joints, in output order |
 
-    `target_columns`: joints with the same index in v share the column of the first joint on the path.
-    `lengths`: sum of `Joint.length` over the joints after the previous moving joint, fixed joints included.
-    If there is no previous moving joint, the sum begins at the base.
+    In `target_columns`, joints with the same index in v share the column of the first joint on the path.
+    An element of `lengths` is a sum of `Joint.length` over all joints, also fixed joints, after the previous
+    moving joint. If there is no previous moving joint, the sum begins at the base.
     """
 
     nq: int
@@ -210,7 +210,7 @@ class _Anchor(NamedTuple):
     """A link's pose relative to the last moving joint.
 
     Attributes:
-        step: Row of this joint in `CompiledTree.steps`; -1 for none.
+        step: Row of the last moving joint in `CompiledTree.steps`; -1 if only fixed joints lead to the link.
     """
 
     step: int
@@ -343,25 +343,26 @@ class ProgramHeader(IntEnum):
 #: A row has a double for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers in an instruction:
-#: the operation, three operands, and the index of the constants.
+#: Number of integers in an instruction.
+#: An instruction contains the operation, three operands, and the index of its first constant.
 INSTRUCTION_WIDTH = 5
-#: Number of integers that describe a joint angle in a program:
-#: 0: scratch row of the coordinate q,
-#: 1: scratch row of the sine; the next row contains the cosine,
-#: 2: index of the mimic rule's constants,
-#: 3: 0 if the angle is q, 1 if the angle is multiplier * q + offset.
+#: Number of integers that describe a joint angle in a program.
+#: Integer 0 is the scratch row of the coordinate q.
+#: Integer 1 is the scratch row of the sine. The next row contains the cosine.
+#: Integer 2 is the index of the mimic rule's constants.
+#: Integer 3 is 0 if the angle is q, and 1 if the angle is multiplier * q + offset.
 ANGLE_WIDTH = 4
-#: Scratch rows. Row 0: number 0. Row 1: number 1.
-#: Rows 2 to 17: results of a frame. Row 18: a joint angle.
-#: Rows from 19: all other numbers.
+#: Row 0 of scratch memory contains the number 0, and row 1 the number 1.
+#: Rows 2 to 17 contain a frame's results, and row 18 contains a joint angle.
+#: The rows from 19 contain all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers per Jacobian column, if a program computes a Hessian:
-#: 0: first scratch row of the column,
-#: 1: the joint's row in `steps`,
-#: 2: the joint's index in v,
-#: 3: first scratch row of six sums of derivatives with respect to the joint's motion.
+#: Number of integers that describe a Jacobian column, if a program computes a Hessian.
+#: Integer 0 is the first scratch row of the column.
+#: Integer 1 is the joint's row in `steps`.
+#: Integer 2 is the joint's index in v.
+#: Integer 3 is the first of six scratch rows.
+#: These rows contain sums of derivatives with respect to the joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINT_OPS = {
@@ -469,8 +470,8 @@ class _ProgramWriter:
     def _joints_and_frames(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield joints and frames in the recursion's order.
 
-        A joint is (previous moving joint, joint, None); a frame is (last moving joint, None, frame). The base
-        has the number -1 instead of a moving joint.
+        A joint gives the tuple (previous moving joint, joint, None). A frame gives the tuple (last moving
+        joint, None, frame). The number -1 means the base.
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -481,9 +482,10 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state of `step` to memory if an event after the next event uses the state.
+        """Save the state of `step` to memory if a later instruction needs this state.
 
-        `following` is the index of the next event. The next event finds the state in the registers.
+        `following` is the index of the next joint or frame. The next joint or frame does not need the saved
+        state, because the registers still contain it.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
@@ -602,7 +604,7 @@ REFERENCES = {
 class KernelArgs(IntEnum):
     """Indices in the array of a kernel's arguments.
 
-    Batches do not use KERNEL and the members after KERNEL.
+    A batch uses only the members before KERNEL.
     """
 
     PROGRAM = 0
@@ -617,7 +619,7 @@ class KernelArgs(IntEnum):
     #: The address is 0 for a fixed base at the world's origin.
     BASE = auto()
     #: Stride (in doubles) between consecutive configurations.
-    #: Stride 0: all configurations use the same row.
+    #: If a stride is 0, all configurations use the same row.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

@@ -1,9 +1,9 @@
 """Decide when a kernel is loaded or compiled.
 
 Numba is imported only when a kernel is loaded or compiled. For a few configurations, plain Python takes less
-time than loading or compiling a kernel. For each kernel, this module therefore adds up the time (s) that
-plain Python has taken. The estimated time of the next computations in plain Python is added. The table lists
-the action when this sum reaches a threshold.
+time than loading or compiling a kernel. For each kernel, this module therefore sums up the time (s) that
+plain Python has taken. The sum includes the estimated time of the next computations. If the sum reaches a
+threshold of this table, the module takes the action beside it.
 
 | time in plain Python | action |
 |---|---|
@@ -31,11 +31,9 @@ from urdfkin.system.locks import import_lock
 if TYPE_CHECKING:
     import subprocess
 
-#: After these times (s) in plain Python, this module loads or compiles a kernel.
-#: The module's docstring describes the action after each of these times.
+#: Thresholds (s) of the time in plain Python; see the module's docstring.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
-#: Each further kernel is loaded when its plain Python version has taken this time (s).
+#: Threshold (s) that replaces `LOAD_AFTER` after the first kernel has been loaded.
 _LOAD_NEXT_AFTER = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
 _SECONDS_SAVED_PER_CALL = 5e-5
@@ -99,8 +97,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single_evaluator(name: str) -> bool:
     """Return whether to use the kernel `one_configuration`, after loading the kernel if necessary.
 
-    The result is False until a batch kernel of the quantity `name` is loaded. Each later call passes
-    the time that `one_configuration` saves in one call to `add_time`.
+    The result is False until a batch kernel of the quantity `name` is loaded. Each later call counts as
+    `_SECONDS_SAVED_PER_CALL` seconds in plain Python.
     """
     if _modes:
         return _modes[-1] == "compiled"

@@ -1,4 +1,4 @@
-"""Number types with which plain Python runs the recursion for one configuration.
+"""Number types for the recursion in plain Python, for one configuration.
 
 Compiled kernels use the number types of `urdfkin.compiled.machine.numbers`. Results with and without
 compilation are exactly the same doubles.
@@ -11,10 +11,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If coordinates, velocities, lengths and multipliers are below this bound L, no result overflows.
-#: For N joints, a joint velocity is below L^2, a path length d is below N L^2,
-#: and an angular velocity w is below N L^2.
-#: The largest product w^2 d is therefore below N^3 L^6.
+#: Let L be this number. No result overflows if coordinates, velocities, lengths and multipliers are below L.
+#: A mimic joint multiplies a velocity or a displacement by its multiplier, so both are below L^2.
+#: For N joints, an angular velocity w and a path length d are therefore below N L^2.
+#: The largest product is w^2 d, which is below N^3 L^6.
 NO_OVERFLOW_BOUND = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0

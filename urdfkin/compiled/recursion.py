@@ -16,9 +16,8 @@ world axes. The joint axis and the interorigin vector have constant components i
 | `select_world_axes` | rotated by R | unchanged |
 | `select_link_axes` | constant; the joint axis is (0, 0, 1) | rotated to the next link's axes |
 
-For velocities and accelerations, the recursion uses the axes in which the result is requested. If the result
-were rotated to these axes at the end, this rotation would add rounding errors. For Jacobians, the recursion
-uses world axes.
+For velocities and accelerations, the recursion uses the axes of the requested reference frame. A rotation of
+the final result would add rounding errors. For Jacobians, the recursion uses world axes.
 
 The placeholder `unused()` replaces each vector that a result does not need. Kernels contain no code for
 operations with the placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions with
@@ -150,7 +149,7 @@ def rotate_frame(axes, state, S):
 
 
 def _rotate_about_z(axes, state, scratch, row):
-    """Rotate about z (7.5); scratch row `row` contains the sine, row `row + 1` the cosine."""
+    """Rotate about z (7.5). The sine is in scratch row `row`, and the cosine is in the next row."""
     return rotate_frame(
         axes, state, eq.about_z(load_number(scratch, row), load_number(scratch, row + 1), zero(), one())
     )
@@ -320,8 +319,8 @@ def _restore_state(scratch, row, state):
 def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row):
     """Read whole blocks of eight numbers, which is faster.
 
-    For example, if nq is 6, the function may read eight numbers. The two additional numbers go to the
-    scratch rows of v. If the recursion needs v, the values of v overwrite the two additional numbers.
+    For example, if q has 6 coordinates, the function may read 8 numbers. The last two numbers go to the
+    scratch rows of v. If the recursion needs v, these rows are overwritten later.
     """
     for i in range(begin, end):
         at = blocks[i]

@@ -6,17 +6,17 @@ A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
-motion of the first joint, so phi and delta are parts of theta and d in the first joint's row. In the same
-way, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes that are not
-nearly parallel, beta is 0. Their x axis has two possible directions. For each direction of x, the six numbers
-other than beta are unique (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for
-nearly parallel axes.
+Rz(phi) rotates about the first joint's axis, and Tz(delta) translates along this axis. Both motions commute
+with the motion of the first joint, so phi and delta are parts of theta and d in the first joint's row.
+Likewise, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes that are
+not nearly parallel, beta is 0, and the x axis has two possible directions. For each direction of x, the six
+numbers other than beta are unique (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and
+for nearly parallel axes.
 
 For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
-pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta of such axes from
-a reference table, except for one row. The d or theta of this row makes the sum agree with the path. In a
-Hayati row, any d is possible, because the axes do not determine d.
+pose determines only the sum of the angles theta. `match_axis_transforms` copies d of parallel axes and theta
+of coinciding axes from a reference table. In one row, d or theta is computed from the sum. In a Hayati row,
+any d is possible, because the axes do not determine d.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ from urdfkin.kinematics.roundings import (
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Below this tilt (rad), an error in the URDF moves the common normal by more than 100 times the error.
+#: Two axes with a smaller tilt (rad) count as nearly parallel.
+#: At this tilt, an error of 1 mm in the URDF can move the common normal by 100 mm.
 NEARLY_PARALLEL = 1e-2
 
 #: Two axes get a Hayati row only if the sine of their tilt is below this number.
@@ -93,11 +94,10 @@ def find_axis_transform(
 ) -> AxisTransform:
     """Factor the transform A between two axes.
 
-    Tilts and lengths within `noise` become zero.
-    `default_phi` is used if the axes do not determine phi.
-    For parallel axes, `delta_next` is the offset along the next axis, and `delta` is 0.
-    With `offset_in_delta`, `delta` is the offset along the first axis, and `delta_next` is 0.
-    `reach` is the length of the path (m).
+    `reach` is the length of the path (m). Tilts and lengths up to `noise` count as rounding errors, and
+    become zero. `default_phi` is used if the axes do not determine phi. For parallel axes, one of the numbers
+    `delta` and `delta_next` contains the whole offset, and the other number is 0. By default, `delta_next`
+    contains the offset. With `offset_in_delta`, `delta` contains the offset.
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_sine(A)
@@ -179,10 +179,10 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Two consecutive joint axes, and the first joint's row in a reference table.
+    """A pair of consecutive joint axes, and the reference table's row of the first joint.
 
-    `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
-    The argument `delta_in` of the methods is the offset from the DH frame to the joint's frame (m).
+    `A` is the (4, 4) pose of the next joint's frame in this joint's frame. The argument `delta_in` of a
+    method is the offset (m) from the first joint's DH frame to its joint frame.
     """
 
     A: FloatArray
@@ -197,7 +197,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether the axes do not determine d: parallel axes, or a Hayati row."""
+        """Whether the axes do not determine d, because they are parallel or the row is a Hayati row."""
         return tilt_sine(self.A) <= self.noise.radians or self._needs_hayati_row
 
     @property
@@ -216,8 +216,8 @@ class PairWithReference:
     def hayati_offset(self) -> float | None:
         """Value of z (m) in this joint's frame where a Hayati row's x axis intersects the joint's axis.
 
-        The value is chosen so that cell a matches the reference.
-        None: parallel axes in the path or in the reference, or |offset| > reach.
+        With this value, the cell a equals the reference. The value is None if the axes are parallel in the
+        path or in the reference, or if the absolute value exceeds the reach.
 
             p: origin of the next joint's frame
             t: unit vector along the projection of the next axis onto the xy plane
@@ -240,7 +240,7 @@ class PairWithReference:
         return offset if abs(offset) <= self.reach else None
 
     def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
-        """Return the transform for the offset `d` (m); `d` is ignored if the axes determine the offset."""
+        """Return the transform for the offset `d` (m). If the axes determine the offset, `d` is ignored."""
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
             return find_axis_transform(A, self.reach, default_phi, hayati=False, noise=self.noise)
@@ -252,7 +252,7 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def delta_in_for_zero_d(self, delta_next: float) -> float:
-        """Return the `delta_in` for which d is 0."""
+        """Return the offset `delta_in` (m) with which d of this row is 0."""
         return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
 
@@ -261,11 +261,11 @@ def match_axis_transforms(
 ) -> tuple[list[AxisTransform], list[float]]:
     """Match the reference table's cells.
 
-    Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint.
-    `tip_offset` is the required `delta_in` of the last joint; None: any.
+    Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint. `tip_offset` is the required `delta_in` of
+    the last joint. If `tip_offset` is None, any `delta_in` is allowed.
 
     Returns:
-        The transforms, and theta of each pair's first joint.
+        The transform of each pair, and theta of each pair's first joint.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -290,7 +290,8 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         revolute joint, i > 0 or reference d = 0      d of the reference
         other joints                                  d with which another cell equals the reference
 
-    The other cell is d of a later row, or a of a Hayati row. If neither exists, d equals d of the reference.
+    The other cell is d of a later row, or a of a Hayati row. Without such a cell, d equals d of the
+    reference.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -303,8 +304,8 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # Let row k be the most tilted of rows i to end - 1. If row k is a Hayati row, d is chosen so that a
-        # of row k equals a of the reference.
+        # Of the rows i to end - 1, the code selects the row with the most tilted axes. If this is a Hayati
+        # row, d of row i is chosen so that the Hayati row's cell a equals the reference.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -322,9 +323,9 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    Exception: i is 0 or joint i is revolute, and prismatic joints i + 1 to k follow.
-    The axes determine phi of row k, but not of rows i + 1 to k - 1.
-    Then theta of rows i + 1 to k equals the reference.
+    There is one exception. Joint i is revolute or the first joint, prismatic joints i + 1 to k follow, and of
+    these joints' rows the axes determine phi only in row k. In this case, theta of rows i + 1 to k equals the
+    reference instead.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
@@ -358,7 +359,7 @@ def reference_or_clean_theta(theta: float, reference: float) -> float:
     )
 
 
-#: Longest permitted length (m). The sum of the squares of longer lengths may overflow.
+#: Longest permitted length (m). Larger lengths could overflow in sums of squares.
 MAX_LENGTH = 1e150
 
 
@@ -389,7 +390,7 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
-    """Tilts and lengths between consecutive axes up to these values count as rounding errors."""
+    """The largest tilt and length between consecutive axes that count as rounding errors."""
 
     radians: float
     metres: float
@@ -401,8 +402,8 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     The bound covers angles rounded to fifteen digits.
 
     Args:
-        joints: Number of joint origin transforms whose product is the pose.
-        length: Sum of the lengths of these transforms' translations, m.
+        joints: Number of joint origin transforms in the product that is the pose.
+        length: Sum of the lengths of the origins' translations, m.
         reach: Length of the whole path, m.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
@@ -423,7 +424,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def sum_zeroed_tilts(chain: FrameChain) -> float:
-    """Bound the orientation error (rad) from tilts set to zero."""
+    """Bound the orientation error (rad) of a table in which the tilts within rounding are zero."""
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_sine(A), abs(float(A[2, 0]))) if tilt <= noise.radians)

@@ -2,13 +2,15 @@
 
 `urdfkin.dh.table` defines the conventions and the factors X.
 
-| New convention | Multiplication | If base or tool has the form Tx(a) Rx(alpha) |
+| New convention | New base or tool | Part of a row |
 |---|---|---|
-| modified | new tool = X_n . tool | the first row contains a and alpha of the base; new base = identity |
-| standard | new base = base . X_1 | the last row contains a and alpha of the tool; new tool = identity |
+| modified | new tool = X_n . tool | a base Tx(a) Rx(alpha) becomes a and alpha of the first row |
+| standard | new base = base . X_1 | a tool Tx(a) Rx(alpha) becomes a and alpha of the last row |
 
-In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis. This frame
-is frame i - 1 of a standard table, or frame i of a modified table.
+If base or tool becomes part of a row, the new base or tool is the identity.
+
+In a tree, the frame of joint i is the Denavit-Hartenberg frame with the joint's axis as its z axis: frame
+i - 1 of a standard table, or frame i of a modified table.
 """
 
 from __future__ import annotations

@@ -192,8 +192,8 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
     """Shift the axis of the prismatic joint k if a neighbouring axis is nearly parallel.
 
-    The shifted axis passes through the neighbouring joint's origin.
-    Without this shift, the common normal of two nearly parallel axes could be far away from the robot.
+    The shifted axis passes through the neighbouring joint's origin. Without the shift, the common normal of
+    the two axes could be far away from the robot.
     """
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
@@ -262,7 +262,7 @@ def _find_transforms_and_thetas(
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
     # For "first" and "each", row i contains the offset from axis i to a parallel axis i + 1.
-    # For "first", `_sum_offsets_in_first_row` later moves the sum to the first row of parallel axes.
+    # For "first", `_sum_offsets_in_first_row` later adds up these offsets in one row.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -301,10 +301,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta from the reference, and adjust the base.
-
-    If d is 0 in the reference, the returned d is 0.
-    """
+    """Copy theta and a zero d from the reference, and adjust the base."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE_ROUNDINGS * EPS or offset:
@@ -316,10 +313,9 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a and alpha from the reference, and adjust the tool.
+    """Copy theta, a, alpha and a zero d from the reference, and adjust the tool.
 
     Nothing is copied if both tables have no tool and their thetas differ by less than 1e-3 rad.
-    Otherwise, the returned d is 0 if d is 0 in the reference.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
@@ -342,10 +338,9 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _fits_last_row(A: FloatArray, options: DerivationOptions, noise: PoseTolerance) -> bool:
-    """Whether the last row can contain A, so that the table needs no tool.
+    """Return whether the last row can contain A, so that the table needs no tool.
 
-    standard   A = Rz Tz Tx Rx
-    modified   A = Rz Tz
+    A must have the form Rz Tz Tx Rx in a standard table, or Rz Tz in a modified table.
     """
     if options.last == "flange":
         return False

@@ -22,15 +22,15 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: If alpha, a or d differ by more than this number, two tables describe different robots.
-#: A cell is ignored if base, tool or a prismatic axis can compensate for the difference in this cell.
+#: Two tables describe different robots if alpha, a or d differ by more than this number.
 #: Angles are in rad, and lengths are relative to the reach.
+#: Cells are not compared if a different base, tool or prismatic axis can compensate for their difference.
 _MAX_CELL_DIFFERENCE = 0.1
 #: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _SAME_ANGLE_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _MIN_CELL_DIFFERENCE = 1e-12
-#: These options follow from the published table if the argument `like` is given.
+#: With the argument `like`, the published table determines these options.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
@@ -48,9 +48,8 @@ def find_reversed_joints(
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
-    # The base can compensate for a reversed first joint.
-    # The tool can compensate for a reversed last joint.
-    # Therefore, both directions of the first and the last joint are tried.
+    # The base can compensate for a reversed first joint, and the tool for a reversed last joint.
+    # The next two lines therefore add the opposite directions of the first and the last joint.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -71,7 +70,7 @@ def find_reversed_joints(
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a sort key, smallest for the closest table."""
+    """Return a sort key; the table most similar to the reference has the smallest key."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
@@ -118,33 +117,34 @@ def make_dh_table(
         tree: The robot.
         tip: A link or joint frame.
         base: A link or joint frame; None: the root.
-        convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
+        convention: "standard" (distal) or "modified" (proximal, Craig's). The textbook uses "standard".
         near_parallel: "hayati": nearly parallel axes have a fifth parameter, beta. "strict": each row has
             only four parameters; offsets of kilometres are possible.
         snap: Tolerance, rad. An angle becomes a multiple of 15 degrees if it changes by at most `snap`. The
-            table's attribute `snap` reports the effect.
+            table's attribute `snap` lists these angles, and bounds of the effect on the tip.
         last: "tip": the last row ends at the tip if possible. "flange": the last row ends on the last joint's
             axis, and the tool leads from this axis to the tip.
-        parallel_offset: Rows that contain the offsets d along consecutive parallel axes. "last": the row of
-            the last of these axes contains the sum of the offsets. "first": the row of the first of these
+        parallel_offset: Selects the rows for the offsets d along consecutive parallel axes. "last": the row
+            of the last of these axes contains the sum of the offsets. "first": the row of the first of these
             axes contains the sum. "each": row i contains the offset from joint i to joint i + 1.
         flip: Joints whose positive direction is reversed (`sense` is -1).
         first: "base": d_1 and theta_1 contain the translation along the first axis and the rotation about
-            this axis. "joint": d_1 and theta_1 are 0, and the base transform contains this motion (Craig's
-            frame 0).
+            this axis. "joint": d_1 and theta_1 are 0, and the base transform contains the translation and the
+            rotation (Craig's frame 0).
         sign: Direction of x, except in the last row, where the tip determines x. "theta": |theta| <= pi/2.
             "a": a >= 0; if a is 0, alpha >= 0. "alpha": alpha >= 0; if alpha is 0, a >= 0. If a and alpha
             are 0, the rule for "theta" applies.
         slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
-            The first joint's axis passes through the base's origin instead. The last joint's axis passes
-            through the tip if a standard table then needs no tool. With near_parallel="strict", an axis
-            passes through the origin of a neighbour with a nearly parallel axis. "minimal": the axis passes
-            through the origin of a neighbouring revolute joint, so a is 0. The next joint has priority.
-            Without a revolute neighbour, the axis is that of "drawn".
+            There are three exceptions. The axis of the first joint passes through the base's origin. The axis
+            of the last joint passes through the tip if a standard table then needs no tool. With
+            near_parallel="strict", an axis passes through the origin of a neighbour with a nearly parallel
+            axis. "minimal": the axis passes through the origin of a neighbouring revolute joint, so the
+            distance a of the two axes is 0. The next joint has priority. Without a revolute neighbour,
+            "minimal" equals "drawn".
         like: A published table. The result copies the positive joint directions, the directions of the x axes
-            and the offsets d along parallel axes. The result also copies theta of the first and last row, and
-            a and alpha of a standard table's last row. Base and tool compensate for these copies. All other
-            numbers come from the URDF. With `like`, the options `last`, `parallel_offset`, `flip`, `first`
+            and the offsets d along parallel axes. It also copies theta of the first and last row, and the
+            last a and alpha of a standard table. Base and tool are adjusted to the copied cells. The URDF
+            determines all other numbers. With `like`, the options `last`, `parallel_offset`, `flip`, `first`
             and `sign` must have their default values.
 
     Raises:

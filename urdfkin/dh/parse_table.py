@@ -133,7 +133,7 @@ class _Grid:
 
     @property
     def has_clear_decimal_comma(self) -> bool:
-        """Whether a number such as 0,4 or 162,5 shows that commas are decimal."""
+        """Whether a number contains a comma that must be a decimal comma, such as 0,4 or 162,5."""
         return any(
             column.name in _NUMBER_COLUMNS and _COMMA.search(_THOUSANDS.sub("", cell))
             for row in self.rows
@@ -396,7 +396,7 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace another joint's variable by a mimic rule.
 
-    Variable qi is the i-th name in `coordinates`; without names, the joint of row i.
+    Variable qi belongs to the i-th joint in `coordinates`. If `coordinates` is empty, it belongs to row i.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]

@@ -57,7 +57,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: These keys contain information about a table, and do not change the table.
+#: Keys of a table that have no effect on its numbers.
 _NOTE_KEYS = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
 _MAPPING_REMEDY = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
@@ -139,8 +139,8 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_column_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    A column of angles usually contains multiples of 15 (degrees) or of pi/12 (radians).
-    A column of lengths rarely contains such a multiple, except 0.
+    A column of angles usually contains multiples of 15 degrees. In radians, these are multiples of pi/12.
+    A length other than 0 is rarely a multiple of 15 or of pi/12.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_list_form(row) for row in lists):
@@ -153,7 +153,7 @@ def _check_column_order(rows: Sequence[Any]) -> None:
         and all(map(_looks_like_round_angle, [*first, *fourth]))
     ):
         raise InputError(
-            "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
+            "the columns look like theta, d, a, alpha (Robotics Toolbox); a list must have the order"
             f" {', '.join(COLUMNS)}",
             where=f"rows 1 to {len(rows)}",
             found=f"second column {second[0]!r}, fourth column {fourth[0]!r}",
@@ -378,7 +378,7 @@ def table_from_rows(
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        coordinates: Names of mimicked joints without a row.
+        coordinates: Names of the mimicked joints that have no row.
 
     Raises:
         InputError: an argument or a row is invalid, a joint has two rows, or rows, base and tool are missing.
@@ -420,7 +420,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     The module's docstring shows the keys.
 
     Raises:
-        InputError: the convention is missing, a key is unknown, or as in `table_from_rows`.
+        InputError: the convention is missing, a key is unknown, or `table_from_rows` raises this error.
         UnknownNameError: as in `table_from_rows`.
     """
     if "convention" not in data:

@@ -103,7 +103,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba needs a Python function as a key, but never calls it.
+        # Numba finds the compiled code by a Python function, but never calls this function.
         descriptor, environment = state.cr.fndesc, state.cr.env
         handle = make_function(
             descriptor.lookup_module(), descriptor.qualname, "", 0, environment, (state.library,)

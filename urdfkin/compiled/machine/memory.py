@@ -131,8 +131,9 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     """Transpose each square block of a matrix.
 
-    `vectors` are the rows of the matrix. The number of rows must be a power of two. Each pass exchanges the
-    upper right and lower left quarters of blocks of 2 w by 2 w numbers.
+    `vectors` are the rows of the matrix. The number of rows must be a power of two. Each pass divides the
+    matrix into blocks of 2 w by 2 w numbers, and exchanges two quarters of each block: the upper right
+    quarter and the lower left quarter.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -295,15 +296,16 @@ def _add_eight_squares(total, x, at):
 
 @inline
 def add_squares(total, x, at, count):
-    """Add `count` squares to the lanes of `total`.
+    """Add the squares of `count` numbers to the lanes of `total`.
 
-    The last `count % 8` squares are added in all eight lanes:
+    The last `count % 8` squares are added in all eight lanes. Therefore, the sum of all lanes has these
+    bounds:
 
         sum of squares <= sum of lanes <= 8 * sum of squares
 
-    `is_in_range` compares the sum of lanes with NO_OVERFLOW_BOUND^2.
+    `is_in_range` compares the sum of all lanes with NO_OVERFLOW_BOUND^2.
     """
-    # Additions to one sum wait for each other, so four sums are faster.
+    # Four sums are faster than one, because the processor adds to different sums at the same time.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
     end = at + count
     while at + 4 * LANES <= end:
@@ -353,8 +355,8 @@ def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy numbers; whole cache lines bypass the caches.
 
-    A write of a whole cache line needs no read. `count` must be at least 7, because up to 7 numbers precede
-    the first whole line. `address` is the address of `to[0]`.
+    A processor that writes a whole cache line does not read it first. `count` must be at least 7, because up
+    to 7 numbers precede the first whole line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

@@ -51,8 +51,8 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
 #: Number of 8-byte words in a Python object's header.
 _HEADER_WORDS = object.__basicsize__ // 8
 #: A Python object consists of 8-byte words.
-#: Word `_TYPE` of an object is the address of the type.
-#: Word `_ITEMS` of a tuple is the address of the first item.
+#: Word `_TYPE` contains the address of the object's type.
+#: In a tuple, word `_ITEMS` contains the address of the first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array (C structure PyArrayObject_fields).
 #: The lower four bytes of `_NDIM` contain the number of axes.
@@ -224,11 +224,9 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: Four items for each quantity:
-#: - the kernel that computes the quantity in WORLD and LOCAL_WORLD_ALIGNED,
-#: - the kernel that computes the quantity in LOCAL,
-#: - the number of inputs (1 for q, 2 for q and v, 3 for q, v and a),
-#: - the number of axes of length nv (1 for a Jacobian, 2 for a Hessian).
+#: The first kernel computes the quantity in WORLD and LOCAL_WORLD_ALIGNED, the second kernel in LOCAL.
+#: The first number counts the inputs q, v and a.
+#: The second number counts the array axes of length nv: 1 for a Jacobian, 2 for a Hessian.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -275,7 +273,7 @@ def _make_evaluator(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     args = np.zeros(len(KernelArgs), dtype=np.int64)
     args[KernelArgs.KERNEL], args[KernelArgs.ORDERS], args[KernelArgs.N] = address, orders, 1
-    # With one configuration, all strides are 0.
+    # All strides remain 0, because the arrays contain one configuration.
     args[KernelArgs.NQ], args[KernelArgs.NV] = plan.nq, plan.nv
     args[KernelArgs.AXES], args[KernelArgs.ROWS], args[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = args, np.ndarray, None, np.empty, shape, *alive

@@ -41,20 +41,20 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: A comparison reports the differing cells only if a correction of these cells reduces the tip error.
-#: The remaining tip error must be at most this fraction of the tip error without the correction.
+#: A comparison corrects the differing cells, and computes the remaining tip error.
+#: It reports the cells if the correction reduces the tip error to at most this fraction.
 #: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
 _MAX_CELLS_ERROR_FRACTION = 0.5
 #: If a table does not agree with the URDF, urdfkin searches for a mistake in the table.
-#: A correction of a mistake is accepted if the corrected table agrees with the URDF.
-#: It is also accepted if the tip error is at most this fraction of the tip error without the correction.
+#: A correction of the mistake is accepted if the corrected table agrees with the URDF.
+#: Otherwise, the correction must reduce the tip error to at most this fraction.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: More cells can differ without a fit than after a fit.
-#: The cells that differ without a fit are reported only if there are at most this number more.
+#: If the additional cells exceed this number, no cells are reported for the comparison without a fit.
 _MAX_MORE_UNFITTED_CELLS = 2
 #: The reach is computed from the positions of the tip.
-#: If the tip moves at most this fraction of the path length, the path length replaces the reach.
+#: If the tip moves by at most this fraction of the path length, the path length is the reach.
 _FIXED_TIP_SPREAD = 1e-6
 #: Half a unit of each cell's last digit, in metres or radians.
 HalfDigits = Sequence[Mapping[str, float]]
@@ -203,16 +203,17 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """In a modified table, row i + 1 contains a, alpha and beta of standard row i.
+    """Return the index of the reference row that contains a cell of standard row i.
 
-    A modified table omits these three cells of the last standard row; the result is then None.
+    In a modified table, a, alpha and beta of standard row i are in the next row. For the last standard row,
+    no such row exists, and the result is None.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Return (n, 5): 1 for a cell that the reference contains, otherwise 0."""
+    """Return an array (n, 5) with 1 for each cell of a standard table that the reference contains, else 0."""
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]

@@ -8,9 +8,9 @@
 Least squares finds small changes that cancel the tip error. Changes of different cells can often cancel the
 same error. The second fit therefore uses reweighted least squares, which change few cells.
 
-If two joint axes nearly coincide, opposite changes of the two joint offsets hardly move the tip. When the
-error no longer decreases, `fit_free_parameters` changes the offsets of two consecutive joints by a large
-angle, and fits again.
+If two joint axes nearly coincide, the tip hardly moves if one joint offset increases and the other decreases.
+When the error no longer decreases, `fit_free_parameters` therefore changes two consecutive joint offsets by a
+large angle. The fit then continues.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ _IS_ANGLE = np.array([motion.turns for motion in _CELL_MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: The fit of the cells ends if the norm of the 6 s errors (s samples) no longer decreases. The norm must
-#: also be at most 6 s * reach * this number.
+#: Let s be the number of samples. The fit of the cells has converged if two conditions hold.
+#: The norm of the 6 s errors no longer decreases, and is at most 6 s * reach * this number.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -65,14 +65,13 @@ _PATIENCE = 4
 _EXACT_FIT_ERROR = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _EXACT_TIP_ERROR = 1e-12
-#: Other joint signs are accepted only if their tip error is below this fraction of the smallest earlier tip
-#: error.
+#: A fit with other joint signs must reduce the tip error to less than this fraction.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: Another fit starts with fitted translations if the tip error of this start is at most this fraction of the
-#: reach.
+#: A table with fitted translations is a start of another fit if its tip error is at most this fraction of
+#: the reach.
 _CLOSE_START = 1e-6
-#: Large changes (rad) of two consecutive joint offsets. theta_i increases by the angle, and theta_{i+1}
-#: decreases by the angle. If alpha is nearer to pi than to 0, theta_{i+1} increases too.
+#: Large changes (rad) of two consecutive joint offsets. The fit adds the angle to theta_i, and subtracts it
+#: from theta_{i+1}. If alpha_i is nearer to pi than to 0, the fit adds the angle to both.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)
@@ -83,8 +82,8 @@ class TableArrays:
     """Numbers of a standard table.
 
     Attributes:
-        cells: (n, 5) theta, d, a, alpha, beta.
-        turns: 1 for a revolute joint.
+        cells: (n, 5) numbers; the columns are theta, d, a, alpha and beta.
+        turns: 1 for each revolute joint, 0 for each prismatic joint.
         senses: Signs of the joints.
     """
 
@@ -221,16 +220,16 @@ def apply_changes(
 ) -> TableArrays:
     """Change free parameters and cells slightly.
 
-    Angles in `free` and `cells` are multiplied by `scale`.
+    For angles, `free` and `cells` contain the change in rad times `scale`.
     """
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
     for i, offset in enumerate(free[12:]):
         k = model.variable_indices[i]
         new_cells[i, k] += offset * units[k]
-    # The twist that changes the base is expressed in the frame of the first revolute joint.
-    # The twist that changes the tool is expressed in the frame of the last revolute joint.
-    # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
+    # A change of the base is a twist in the frame of the first revolute joint.
+    # A change of the tool is a twist in the frame of the last revolute joint.
+    # Rotations about the z axes of these two frames have exactly the same effect as joint offsets.
     base = _apply_twist(model.base @ model.T_0_first_revolute, free[:6], scale) @ np.linalg.inv(
         model.T_0_first_revolute
     )
@@ -267,7 +266,8 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         cell_derivatives = cell_derivatives * mask.ravel()
         free_derivatives = free_derivatives if free else np.zeros_like(free_derivatives)
         cells = _sparse_changes(model, start, free_derivatives, cell_derivatives, error, scale)
-        # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
+        # If two axes nearly coincide, large changes of the two offsets can cancel at the tip.
+        # The cutoff rcond prevents such changes.
         offsets = np.linalg.lstsq(free_derivatives, error - cell_derivatives @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
@@ -284,8 +284,8 @@ def _sparse_changes(
 ) -> FloatArray:
     """Return changes of cells that remove the tip error.
 
-    The changed table differs from `start` in as few cells as possible. A cell is not changed if
-    changes of the free parameters have the same effect on the tip.
+    The changed table differs from `start` in as few cells as possible. If base, tool and joint offsets can
+    have the same effect on the tip as a cell, the function does not change this cell.
     """
     Q = _orthonormal_basis(free_derivatives)
     remaining = cell_derivatives - Q @ (Q.T @ cell_derivatives)
@@ -348,8 +348,7 @@ def fit_model(
     if best_error <= EPS * fitted_table_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, targets, *(FAST_SEARCH if fast else ()))):
-        # A fit minimizes the sum of squared errors.
-        # Therefore, a fit can increase the largest error.
+        # A fit minimizes the sum of squared errors, so the largest error can increase.
         model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=largest_error)
         model_error = largest_error(model)
         if model_error < (1.0 if i == 0 else _OTHER_SIGNS_ERROR_RATIO) * best_error:
@@ -381,7 +380,7 @@ def start_models(
 ) -> Iterator[TableArrays]:
     """Yield the table, then one or two tables for each likely combination of joint signs.
 
-    The second table of a combination has fitted translations.
+    If there are two tables for a combination, the translations are fitted in the second table.
     """
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
@@ -400,7 +399,7 @@ def start_models(
 def _fit_translations(model: TableArrays, targets: TargetPoses) -> TableArrays:
     """Fit the offsets of prismatic joints and the translations of base and tool.
 
-    The tip's position is a linear function of these numbers, so one step of any length is exact.
+    The position of the tip is linear in these offsets and translations, so one step gives the exact fit.
     """
     poses, derivatives, _ = tip_poses_and_derivatives(model, targets)
     translations = np.concatenate([np.tile([True, True, True, False, False, False], 2), model.turns == 0.0])
@@ -458,7 +457,7 @@ def _least_squares_fit(
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
     """Return tables in which the offsets of two consecutive revolute joints change by large angles.
 
-    The two rotations cancel if the joints' axes coincide.
+    If the axes of the two joints coincide, the two changes cancel.
     """
     models = []
     for i in range(len(model.cells) - 1):

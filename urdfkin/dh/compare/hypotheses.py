@@ -2,10 +2,11 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances, angles and offsets of consecutive axes. `find_better_interpretation` ranks
-the interpretations by a sum, and fits at most the three best:
+the interpretations by this number, and fits at most the three best interpretations:
 
-    sum of |shape of the table - shape of the URDF|
-    + cost of each difference from the interpretation that the file states
+    sum of |shape of the table - shape of the URDF| + cost * number of differences
+
+The differences are those from the interpretation that the file states.
 """
 
 from __future__ import annotations
@@ -33,19 +34,19 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Cost (metres) of each difference from the interpretation that the file states:
-#: cost = _DIFFERENCE_COST_RATIO * min(D) + tolerance
-#: D: sum of |shape of the table - shape of the URDF|
+#: Each difference from the interpretation that the file states has this cost (metres):
+#: `cost = _DIFFERENCE_COST_RATIO * min(D) + tolerance`
+#: D is the sum of |shape of the table - shape of the URDF|.
 #: The minimum is over all other interpretations with the URDF's joint kinds.
 _DIFFERENCE_COST_RATIO = 0.1
 #: A tip error within the tolerance is accepted, and ends the search for a better interpretation.
-#: Above the tolerance, the tip error must be at most this fraction of the reach,
-#: and at most this fraction of the tip error of the interpretation that the file states.
+#: A larger tip error is accepted if it is at most this fraction of two lengths.
+#: The lengths are the reach, and the tip error of the interpretation that the file states.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: `find_better_interpretation` ignores these keys of a table.
-#: The function fits base and tool, and `coordinates` has an effect only with mimic rules.
+#: `find_better_interpretation` ignores the keys "base" and "tool", because it fits base and tool.
+#: It ignores "coordinates", because this key has an effect only with mimic rules.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
@@ -86,11 +87,12 @@ def find_better_interpretation(
 ) -> BetterInterpretation | None:
     """Find another interpretation that fits the URDF.
 
-    Accepted tip errors:
+    The tip error must meet this condition:
 
         error <= max(tolerance, 0.05 min(stated_error, reach))
 
-    `tolerance` and `stated_error` are in metres. `data` comes from `mapping_from_text`.
+    `tolerance` and `stated_error` are in metres. `stated_error` is the tip error of the interpretation that
+    the file states. `data` comes from `mapping_from_text`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -101,7 +103,7 @@ def find_better_interpretation(
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
         # A joint is prismatic if its variable is in the column d.
-        # An exchange of columns can change a joint's kind.
+        # Other column names can therefore change a joint's kind.
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
             continue
         difference = float(np.abs(path_shape(table, chain.reach) - shape_of_urdf).sum())
@@ -171,12 +173,9 @@ def find_dh_convention(
 def path_shape(table: DHTable, scale: float) -> FloatArray:
     """Return offsets, distances and angles between consecutive axes.
 
-    Joint signs, joint offsets, base and tool have no effect. Angles are multiplied by `scale`. Some lengths
-    are 0, because they depend on free choices:
-
-        lengths next to a prismatic axis
-        offset along the first axis
-        offset along parallel axes
+    Joint signs, joint offsets, base and tool have no effect. Angles are multiplied by `scale`. Lengths that
+    depend on free choices are replaced by 0: lengths next to a prismatic axis, the offset along the first
+    axis, and the offset along parallel axes.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False

@@ -32,13 +32,13 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _SAME_VALUE_TOLERANCE = 1e-9
-#: If a table has more possible corrections than this number, joint offsets and joint signs are not fitted.
+#: Maximum number of possible corrections for which joint offsets and joint signs are fitted.
 _MAX_FITTED_CORRECTIONS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class _TableCorrection:
-    """`cell` is None if the order of rows is corrected."""
+    """A corrected table; `cell` is None for a correction of the order of rows."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -93,7 +93,7 @@ class MistakeSearch:
         return ()
 
     def _agrees_after_one_fit_change(self, table: DHTable) -> bool:
-        """One change: the base, the tool, a joint offset or a joint sign."""
+        """Return whether one change of base, tool, a joint offset or a joint sign suffices."""
         if self._fit_one_end(table) is not None:
             return True
         model = self._fit_zeros_and_senses(table)
@@ -110,7 +110,7 @@ class MistakeSearch:
         return model if self._agrees(model) else None
 
     def _fit_one_end(self, table: DHTable) -> TableArrays | None:
-        """Fit only the tool, or only the base."""
+        """Fit only the tool. If the table then does not agree, fit only the base."""
         model = _make_model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
         with_tool = replace(model, tool=_mean_pose(model.tool @ np.linalg.inv(poses) @ target_poses))
@@ -194,8 +194,8 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # With two or three rows, a reversal only exchanges the first and the last row.
-    # The loop above already contains this exchange.
+    # In a table of two or three rows, a reversal only exchanges the first and the last row.
+    # The loop above already yields this correction.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))

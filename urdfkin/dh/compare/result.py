@@ -20,13 +20,12 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: After a correction of cells, a tip error up to this number is treated as zero.
+#: If the tip error after a correction of cells is at most this number, it counts as zero.
 #: The unit is rad, or metres per metre of reach.
 #: The rounding errors of a fit are far below this number.
 #: The rounding errors of numbers in data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
-#: Smallest tip error that `fit_resolution` uses (rad, or metres per metre of reach).
-#: A tip error below this number is replaced by this number.
+#: `fit_resolution` increases smaller tip errors to this number (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
 #: Half a unit of a cell's last digit is multiplied by this factor.
 #: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
@@ -41,9 +40,9 @@ class CellDifference:
 
     Attributes:
         row: Index of the row, from 0.
-        tip_displacement: Largest displacement (m) of the tip by the correction of this cell, on samples.
+        tip_displacement: Largest distance (m) by which a correction of this cell moves the tip, on samples.
         half_digit: Half a unit of the last digit of `reference`.
-            0 if the value is exact or the cell's text is unknown.
+            0 for an exact value, and for a value without text.
     """
 
     row: int
@@ -118,8 +117,8 @@ class Mistake:
         rows: Indices of the wrong rows, from 0.
         cell: The wrong cell; None if the order of rows is wrong.
         table: The corrected table.
-        fit_changes: Fit of the corrected table.
-        metres, radians: Largest tip errors after this fit, on samples.
+        fit_changes: Parameters that a fit of the corrected table changed.
+        metres, radians: Largest tip errors of the corrected and fitted table, on samples.
     """
 
     kind: MistakeKind
@@ -145,9 +144,9 @@ class TableComparison:
             The bounds hold for all angles, and for displacements within the limits.
             Without limits, a prismatic joint is assumed within 10 m of zero.
         unfitted_metres, unfitted_radians: Tip errors without a fit.
-        unfitted_differences: Cells that must change so that the unfitted table agrees.
-            Empty if `is_fitted` is false, or if `mistakes` is not empty.
-            Empty if a tip error remains, or if more than len(differences) + 2 cells must change.
+        unfitted_differences: Cells to change, so that the table agrees with the URDF without a fit.
+            Empty if `is_fitted` is false, if `mistakes` is not empty, or if a tip error remains.
+            Empty if more than len(differences) + 2 cells must change.
         not_compared: Row index and name of each cell that a fit cannot check, because a change of base, tool
             or joint offsets has the same effect.
         residual: Tip error after cell corrections, m.
@@ -212,7 +211,7 @@ class TableComparison:
     def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        The proof covers the same joint values as `metres_bound`.
+        The proof holds for all angles, and for displacements within the limits, like `metres_bound`.
         """
         return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 
@@ -235,8 +234,8 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether both limits are finite, and lower < upper.
 
-    If lower = upper, poses do not show the joint's direction of motion. Both limits are 0 if a URDF
-    omits them.
+    If the limits are equal, poses do not show the joint's direction of motion. If a URDF omits the limits,
+    both are 0.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 

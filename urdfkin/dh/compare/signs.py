@@ -67,7 +67,7 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """An alignment of the first joints with the first rows.
+    """Signs and offsets with which the first joints of a path match the first rows of a table.
 
     Attributes:
         cost: Weighted difference of cells, plus the cost of reversed joints, m.
@@ -106,9 +106,8 @@ def find_sign_fits(
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
-    # If axes nearly coincide, many directions of x are nearly equivalent.
-    # One start value is enough for all these directions, because the fit can rotate x.
-    # Therefore, only the best alignment is kept for each combination of joint signs.
+    # If axes nearly coincide, many directions of x give nearly equal tables.
+    # For each combination of joint signs, one alignment is enough, because the fit can rotate x.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -133,7 +132,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
     """Return A_k for two joint signs.
 
-    A sign -1 turns a joint frame by pi about x.
+    For the sign -1, the joint frame is rotated by pi about its x axis.
     """
     A = chain.constants[k]
     A = _HALF_TURN_ABOUT_X @ A if sense_before < 0 else A
@@ -213,8 +212,9 @@ def _possible_transforms(
         # Therefore, x can have any direction if one of the two joints is prismatic.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
-        # With reach 0, every common normal is distant, except a normal through both origins.
+        # If the tilt is above `NEARLY_PARALLEL`, `find_axis_transform` makes a Hayati row only if the common
+        # normal is farther from an origin than the reach. The reach 0 therefore gives a Hayati row, unless
+        # the common normal passes through both origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
 _TEXT_MODULE = "urdfkin.dh.export.text"
-#: For each format NAME: the module that contains the function `write_NAME`, and a description.
+#: Module and description of each format. The module contains the function `write_NAME` for a format NAME.
 #: The module name is "" if the package `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT_MODULE, "aligned text"),

@@ -1,7 +1,7 @@
 """Write a table as plain data, or as JSON, TOML or CSV.
 
-`urdfkin.dh.rows.table_from_mapping` reads the plain data, and `urdfkin.dh.read_table` reads the files. All
-numbers are exact to the last bit.
+`urdfkin.dh.rows.table_from_mapping` reads plain data. `urdfkin.dh.read_table` reads JSON, TOML and CSV files.
+All numbers are exact to the last bit.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: A bound is multiplied by this factor before the last printed digit is rounded up.
-#: Without the factor, a tiny rounding error of the bound could increase the last digit by 1.
+#: Printed bounds are multiplied by this factor, and rounded up.
+#: Without the factor, a tiny rounding error of a bound could increase the last digit by 1.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
@@ -65,7 +65,7 @@ def format_coordinate_names(table: DHTable) -> str:
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
-    """Return the offsets that the mimic rule of a row adds to theta and d."""
+    """Return the offset of a row's mimic rule as parts of theta and d; one part is 0."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
     return (offset, 0.0) if row.kind.turns else (0.0, offset)
 
@@ -256,7 +256,7 @@ class PrintedPrecision:
     Attributes:
         metres: Largest position error on the samples.
         bound: Proven bound within the joint limits, m; None if no finite bound is known.
-        condition: Condition on the joint values under which the bound holds, or "".
+        condition: Condition of the bound, for example on the travel of a joint; "" without a condition.
     """
 
     digits: int
@@ -283,8 +283,7 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     rows = tuple(_round_row(row, units) for row in table.rows)
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
-    # `DHTable` rejects rotations that are rounded to few digits.
-    # Therefore, the table is evaluated without base and tool.
+    # `DHTable` rejects a base or tool with a rotation that is rounded to few digits.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)
@@ -312,9 +311,9 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
-    """Return the largest absolute value of the joint that the joint of `row` mimics.
+    """Return the largest absolute value of the mimicked joint in the mimic rule of `row`.
 
-    The value is 0 without a mimic rule, or with the multiplier 0.
+    If the row has no mimic rule, or the multiplier is 0, the result is 0.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
@@ -326,12 +325,10 @@ def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
 
 
 def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Bound the tip error due to rounded table numbers.
+    """Bound the tip error (m) due to rounded table numbers.
 
-        lever: upper bound of the distance from the row's frame to the tip
-        tip motion due to the rounding error of an angle <= error * lever
-
-    The unit is metres.
+    The rounding error of an angle moves the tip by at most error * lever. The lever is an upper bound of the
+    distance from the row's frame to the tip.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
