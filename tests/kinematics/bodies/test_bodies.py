@@ -130,7 +130,9 @@ def test_the_representation_matrix_of_a_quaternion_has_a_right_inverse_at_every_
 def test_at_a_representation_singularity_the_jacobian_is_refused_with_the_distance() -> None:
     for sequence, middle in (("ZYZ", 0.0), ("xyz", np.pi / 2)):
         singular = rotation_from_euler(sequence, [0.3, middle, 0.0])
-        with pytest.raises(RepresentationSingularityError, match=f"{sequence}.*rad from the singularity") as caught:
+        with pytest.raises(
+            RepresentationSingularityError, match=f"{sequence}.*rad from the singularity"
+        ) as caught:
             analytical_jacobian(sequence, singular, np.ones((6, 3)))
         assert caught.value.distance < 1e-9
         # The angular velocity of Euler rates exists in every configuration.
