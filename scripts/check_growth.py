@@ -196,7 +196,7 @@ if __name__ == "__main__":
         print(measure_cost(options.words[0], options.one))
         sys.exit()
     sizes = [float(size) for size in options.sizes.split(",")]
-    heads = ["seconds and megabytes for each megabyte of", *(f"{size:g} MB" for size in sizes)]
+    heads = ["time (s) and memory (MB) per megabyte of", *(f"{size:g} MB" for size in sizes)]
     print(table(heads, [], left=1))
     for kind in (kind for kind in KINDS if not options.words or any(word in kind for word in options.words)):
         cells: list[str] = []

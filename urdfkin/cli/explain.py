@@ -34,8 +34,8 @@ def answers() -> dict[str, str]:
 def find_answer(topic: str) -> str | None:
     """Return the section of docs/questions.md about a topic.
 
-    The function first searches for the section with the anchor `topic`. Without such a section, the only
-    section whose anchor contains all words of `topic` is returned. Otherwise, the result is None.
+    The function first searches for the section with the anchor `topic`. If there is none, the
+    function searches for anchors with all words of `topic`. The result is None unless there is exactly one.
     """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]

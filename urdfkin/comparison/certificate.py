@@ -196,8 +196,8 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. Unmatched joints and links on different joints"
-            " come last."
+            "Differences, in order from the base to the tips. The last entries are joints of only one model,"
+            " and links that different joints carry."
         ),
     ]
     remarks: Annotated[

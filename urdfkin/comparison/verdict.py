@@ -435,7 +435,7 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Try to reduce the distances in `uppers` to `target` (m) by branch and bound."""
+        """Reduce the upper bounds in `uppers` by branch and bound, until all are at most `target` (m)."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -633,8 +633,8 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
 
-    If a link on B's root body has the name of A's root, this link coincides with A's root. If a link on A's
-    root body has the name of B's root, this link coincides with B's root. Otherwise, the roots coincide.
+    If B's root body has a link with the name of A's root, this link is placed at A's root. If A's root body
+    has a link with the name of B's root, B's root is placed at this link. Otherwise, the roots coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])

@@ -305,7 +305,7 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
         # Of the rows i to end - 1, the code selects the row with the most tilted axes. If this is a Hayati
-        # row, d of row i is chosen so that the Hayati row's cell a equals the reference.
+        # row, d of row i is chosen so that the cell a of the Hayati row gets its reference value.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:

@@ -1,4 +1,4 @@
-"""Check the seal and the test vectors of an exported file.
+"""Check the test vectors of an exported file, and the digest in its header (the seal).
 
 The seal is a line in the header with the digest of the file's text. The seal shows whether the header, the
 code or the test vectors were changed. A seal is not a signature, so it does not prove who wrote the file.

@@ -148,7 +148,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """Pinocchio's problem with a file that conforms to the URDF specification.
+    """Ways in which Pinocchio fails to read a file that conforms to the URDF specification.
 
     - `REFUSES`: Pinocchio refuses the file.
     - `DIFFERS`: Pinocchio deviates from the URDF specification.

@@ -780,7 +780,9 @@ class _StageReader:
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            message = "a limit of a joint is blocked, and USD readers use different values instead"
+            message = (
+                "the value of a joint limit is blocked (None), and USD readers then use different limits"
+            )
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)

@@ -701,7 +701,7 @@ def singularity_margin(plan: CompiledTree) -> float:
 
 
 def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Add up |multiplier| of the joints on a path that move with the same joint velocity.
+    """For each path and joint velocity, add up |multiplier| of the joints that move with this velocity.
 
     For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 

@@ -18,8 +18,9 @@ effect of the rounded angles. The bound on rounding errors is proportional to a 
 reach. The reach is the path length from the root to the table's base, plus the path length from the root to
 the tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than
 the reach, the bound uses this sum, but at most `MAX_LENGTH_RATIO` times the reach. With Hayati rows, each
-length in the table is at most `MAX_LENGTH_RATIO` times the reach (docs/dh.md). By mimic rules, a coordinate
-can move several joints, so the bound on a Jacobian column is proportional to the sum of their |multiplier|.
+length in the table is at most `MAX_LENGTH_RATIO` times the reach (docs/dh.md). A coordinate
+and its mimic joints move together. The bound on a Jacobian column is therefore proportional to the sum of the
+absolute multipliers of these joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 lengths of this size cancel, the tip has an error of eps times the lengths. urdfkin accepts a difference

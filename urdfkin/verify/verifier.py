@@ -467,7 +467,7 @@ def as_verify(verify: object) -> Verify:
 
 
 def split_into_parts(verify: Verify, n: int, values_per_configuration: int) -> Iterator[slice | IntArray]:
-    """Yield the indices of checked configurations in parts.
+    """Split the checked configurations into parts, and yield the indices of each part.
 
     With "sample", the configurations are random, because a regular choice may be biased.
     `values_per_configuration` is the number of compared numbers for one configuration.

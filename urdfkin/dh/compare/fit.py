@@ -67,8 +67,8 @@ _EXACT_FIT_ERROR = 1e-13
 _EXACT_TIP_ERROR = 1e-12
 #: A fit with other joint signs must reduce the tip error to less than this fraction.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: A table with fitted translations is a start of another fit if its tip error is at most this fraction of
-#: the reach.
+#: After a fit of the translations, another fit starts from the fitted table if the tip error is at most this
+#: fraction of the reach.
 _CLOSE_START = 1e-6
 #: Large changes (rad) of two consecutive joint offsets. The fit adds the angle to theta_i, and subtracts it
 #: from theta_{i+1}. If alpha_i is nearer to pi than to 0, the fit adds the angle to both.
@@ -203,9 +203,9 @@ def tip_poses_and_derivatives(
 
 
 def _tip_twists_of_frame_motions(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's twists (6 s, 6) for unit motions of a frame, at s samples.
+    """Return the tip's twists for unit motions of a frame, as an array (6 s, 6) for s samples.
 
-    Columns: translations along the frame's axes, rotations about the frame's axes.
+    The columns are translations along the frame's axes, and rotations about these axes.
     """
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)

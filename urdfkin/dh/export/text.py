@@ -65,7 +65,7 @@ def format_coordinate_names(table: DHTable) -> str:
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
-    """Return the offset of a row's mimic rule as parts of theta and d; one part is 0."""
+    """Return two numbers: the mimic rule adds the first to theta and the second to d."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
     return (offset, 0.0) if row.kind.turns else (0.0, offset)
 

@@ -366,7 +366,7 @@ def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoice
         r, J = _errors(alignment, X, offsets, size, with_links=with_links)
         change = scales * np.linalg.lstsq(J * scales, -r, rcond=None)[0]
         X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
-        # If two axes nearly coincide, a step can add many turns. Large angles have large rounding errors.
+        # If two axes nearly coincide, an offset can become many turns. Large angles have large rounding.
         offsets = np.where(turns & (np.abs(offsets) > pi), np.remainder(offsets + pi, 2.0 * pi) - pi, offsets)
     joints = alignment.a.tree.joints
     zeros = {joints[s.a].name: (s.sense, float(x)) for s, x in zip(alignment.steps, offsets, strict=True)}
@@ -506,9 +506,9 @@ def _first_revolute_axes(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """For each branch of A with each branch of B, return the first revolute axes of both branches.
 
-    A pair is an axis of A and an axis of B. Each item contains a revolute pair, the prismatic pairs before
-    the revolute pair, and the pairs from `later_axes`. If the branches have no revolute pair, the last
-    prismatic pair replaces it.
+    A pair is an axis of A and an axis of B. Each item contains the first pair of revolute axes, all pairs of
+    prismatic axes before this pair, and the result of `later_axes`. If the branches have no revolute axes,
+    the last pair of prismatic axes comes first.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):

@@ -92,8 +92,8 @@ class BodyPair:
 
     Attributes:
         via: The joints of A and of B before the bodies. None for the bodies at which the search starts.
-        previous: Index in `Alignment.steps` of the joint pair before the bodies. -1 if `Alignment.steps` does
-            not contain such a pair.
+        previous: Index in `Alignment.steps` of the two joints before the two bodies. -1 if the list does
+            not contain them.
         motion_a: (4, 4) motion G, the product of the motions L at earlier joints.
         motion_b: (4, 4) motion of B's body. The root pose, earlier zero offsets and earlier conversions
             determine this motion. The matcher compares motion_a @ (zero pose of A's link) with

@@ -36,7 +36,7 @@ from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file.
 #: The fixes of one pass do not overlap.
-#: A pass fixes findings of one code only.
+#: Each pass fixes only findings with the same code, such as URDF303.
 MAX_PASSES = 100
 
 #: Rounding to doubles rotates a unit vector by at most this angle (rad).

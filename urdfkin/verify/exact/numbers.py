@@ -33,7 +33,7 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Number of decimal digits for a path without joints.
+#: Number of decimal digits in calculations for a path without joints; each joint adds digits.
 #: A double has about 16 digits.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
