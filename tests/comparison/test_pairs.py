@@ -21,6 +21,7 @@ from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.certificate import SAME
 from urdfkin.comparison.result import Verdict
 from urdfkin.dh import make_dh_table
+from urdfkin.model.mechanisms import matcher
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
@@ -257,6 +258,13 @@ def test_a_common_base_and_a_common_tip_fix_the_zeros_of_prismatic_joints(common
         found = urdfkin.same(a, b, bounds=False)
         assert found.verdict is Verdict.SAME_AFTER, seed
         assert moves_alike(found, a, b)
+
+
+def test_the_zeros_of_many_joints_are_not_computed_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(matcher, "MAX_REFINED_JOINTS", 2)
+    a = random_chain("RPR", 0)
+    b = loaded(pairs.disguised(a.tree, 0))
+    assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
 
 
 def test_a_chain_with_a_displaced_axis_differs_without_common_names() -> None:

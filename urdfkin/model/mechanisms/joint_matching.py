@@ -345,6 +345,8 @@ def later_axes(
 #: Number of Gauss-Newton steps. Two steps are usually enough. If axes are parallel up to 1e-8 rad, a step can
 #: change an angle by 1 rad, and more steps are necessary.
 _REFINEMENT_STEPS = 10
+#: A step with smaller changes (rad and m) is the last one.
+_NEGLIGIBLE_CHANGE = 1e-14
 
 
 def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoices:
@@ -366,6 +368,8 @@ def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoice
         r, J = _errors(alignment, X, offsets, size, with_links=with_links)
         change = scales * np.linalg.lstsq(J * scales, -r, rcond=None)[0]
         X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
+        if np.abs(change).max() < _NEGLIGIBLE_CHANGE:
+            break
         # If two axes nearly coincide, an offset can become many turns. Large angles have large rounding.
         offsets = np.where(turns & (np.abs(offsets) > pi), np.remainder(offsets + pi, 2.0 * pi) - pi, offsets)
     joints = alignment.a.tree.joints

@@ -726,6 +726,9 @@ MAX_ORDERS = 120
 MAX_LOOK_AHEAD_PAIRS = 2000
 #: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
+#: Maximum number of joint pairs for which all zero offsets are computed together.
+#: The time of this computation grows with the cube of the number.
+MAX_REFINED_JOINTS = 100
 #: Maximum number of attempts to exchange the partners of two joint pairs.
 MAX_EXCHANGES = 12
 
@@ -841,7 +844,7 @@ def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignmen
     zero offsets. If axes are nearly parallel, they determine the zero offsets only together.
     """
     agrees = best.all_joints_agree if best.has_free_frames else best.is_complete
-    if agrees or best.only_a or best.only_b or not best.steps:
+    if agrees or best.only_a or best.only_b or not 0 < len(best.steps) <= MAX_REFINED_JOINTS:
         return best
     for start in _starts_of_refinement(best, name_map):
         if any(step.kind not in ("turns", "prismatic") or step.kind_difference for step in start.steps):
