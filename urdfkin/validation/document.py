@@ -204,7 +204,7 @@ class Chain(TypedDict):
     tip: Annotated[str, doc("Name of the chain's tip frame.")]
     standard: ReportedDHTable
     modified: ReportedDHTable
-    samples: Annotated[Count, doc("Number of compared configurations.")]
+    samples: Annotated[Count, doc("Number of compared configurations; 0 if nothing was compared.")]
     metres: Annotated[
         float | None,
         doc("Largest distance (metres) of a table's tip from Pinocchio's tip. null: nothing was compared."),
@@ -288,7 +288,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """For each library, the number of results in which only this library differs from the others."""
+    """For each library, the number of results in which it differs from two libraries that agree."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -334,8 +334,8 @@ class ReportedCheck(TypedDict):
     histogram: Annotated[
         list[Count],
         doc(
-            "Number of results in each bin. The first bin is below the first of `histogram_edges`, and the"
-            " last bin is above the last edge."
+            "Number of results in each bin. The first bin is below the first of `histogram_edges`, the last"
+            " bin is above the last edge, and every other bin is between two adjacent edges."
         ),
     ]
     subjects: Annotated[
