@@ -37,7 +37,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, compute_oracle_results, compute_own_results
 
-#: A double stores every decimal of 15 digits.
+#: A double distinguishes all decimals of 15 digits.
 #: The maximum of 10,000 digits limits the computing time.
 MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
