@@ -236,7 +236,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _changes_with_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield differences of the whole models, for models whose joints cannot be compared one by one."""
+    """Yield the differences that `same` finds, if the joints cannot be compared one by one."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}

@@ -121,7 +121,7 @@ class Difference:
     """One difference between two models.
 
     Attributes:
-        place: The joint or link, for example "joint elbow". The name is A's, unless only B has the joint.
+        place: The joint or link, for example "joint elbow". The name is A's, unless only B has it.
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         a: The parameter's value in A; None if A has no value.
         b: The parameter's value in B; None if B has no value.
@@ -223,7 +223,7 @@ def _format_range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference between two joints or links that is larger than rounding errors.
+    """A difference that rounding does not explain, or a joint or link that cannot be compared.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
@@ -423,7 +423,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval of the largest distance between the unchanged models, at equal joint values.
+        """The interval of the frame that differs most between the unchanged models, at equal joint values.
 
         If `as_written` is None, the result is `worst`.
 

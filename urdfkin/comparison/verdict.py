@@ -435,7 +435,10 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Reduce the upper bounds in `uppers` by branch and bound, until all are at most `target` (m)."""
+        """Try to reduce the upper bounds in `uppers` to at most `target` (m) by branch and bound.
+
+        The method stops at the first bound that stays above `target`.
+        """
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -769,7 +772,7 @@ class JointComparison:
     def places_in_second_model(self) -> dict[str, str]:
         """Map each matched link and joint of the first model, for example "joint j", to its match.
 
-        Fixed joints match if their child links match.
+        A fixed joint is mapped to the joint before the link that matches its child link.
         """
         a, b = self.trees
         places = {f"link {a.links[link]}": f"link {b.links[other]}" for link, other in self.pairs.items()}

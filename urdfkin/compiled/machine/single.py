@@ -225,7 +225,7 @@ def array_layout_is_known() -> bool:
 
 
 #: The first kernel computes the quantity in WORLD and LOCAL_WORLD_ALIGNED, the second kernel in LOCAL.
-#: The first number counts the inputs q, v and a.
+#: The first number is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
 #: The second number counts the array axes of length nv: 1 for a Jacobian, 2 for a Hessian.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
