@@ -122,6 +122,13 @@ def test_identifiers_are_valid_and_unique(names: list[str]) -> None:
         assert not word.startswith("_")
 
 
+@pytest.mark.parametrize(
+    ("robot", "frame"), [("2" * 40, "tool_frame1"), ("2" * 40, "3" * 40), ("a" * 40, "b" * 40)]
+)
+def test_the_name_of_an_exported_matlab_function_has_at_most_63_characters(robot: str, frame: str) -> None:
+    assert len(f"{function_prefix(robot, frame)}_kinematics") <= 63
+
+
 @given(st.text(max_size=60) | st.sampled_from([*_WORDS, *NAMES.values()]))
 def test_a_name_in_a_comment_cannot_end_the_comment(name: str) -> None:
     for text in (comment_name(name), comment_name(name * 50)):

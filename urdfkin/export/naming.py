@@ -13,7 +13,7 @@ from urdfkin.dh.export.code import sanitize
 
 #: Maximum length of a name without prefix and number. MATLAB allows 63 characters in all.
 _MAX_LENGTH = 40
-#: Maximum length of a prefix; the exported code appends at most 11 characters to it: `_kinematics`.
+#: Maximum length of a prefix. MATLAB code appends 11 characters to it: `_kinematics`.
 _MAX_PREFIX_LENGTH = 52
 _MAX_COMMENT_LENGTH = 80
 
@@ -50,8 +50,8 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 def function_prefix(robot: str, frame: str) -> str:
     """Return the prefix of a frame's exported functions.
 
-    The prefix begins with a letter and has at most 52 characters. If both names together are longer, the
-    prefix contains only the name of the frame.
+    The prefix begins with a letter and has at most 52 characters. If a prefix with both names is longer,
+    the prefix contains only the name of the frame.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')
@@ -59,10 +59,9 @@ def function_prefix(robot: str, frame: str) -> str:
     ('robot_2_x', 'my_arm')
     """
     first, second = safe_name(robot) if robot else "", safe_name(frame)
-    word = second if second.startswith(first) else f"{first}_{second}"
-    if len(word) > _MAX_PREFIX_LENGTH:
-        word = second
-    return word if word[0].isalpha() else f"robot_{word}"
+    both = second if second.startswith(first) else f"{first}_{second}"
+    prefixes = [word if word[0].isalpha() else f"robot_{word}" for word in (both, second)]
+    return prefixes[0] if len(prefixes[0]) <= _MAX_PREFIX_LENGTH else prefixes[1]
 
 
 def comment_name(name: str) -> str:
