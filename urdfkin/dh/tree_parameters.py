@@ -11,8 +11,8 @@ The axis x_i is along the common normal of two axes: the axis of link i, and the
 child of link i. Therefore, gamma and b of the first moving child are zero. For a chain without branches, the
 table has the form of the modified Denavit-Hartenberg table. The modified table writes a(i-1) instead of d,
 and d(i) instead of r. These rules do not apply to frame 0, the last row and parallel axes. The original
-notation has no angle beta. The angle is zero unless two axes are nearly parallel. Without beta, nearly
-parallel axes may need offsets of kilometres (Hayati).
+notation has no angle beta. In this table, beta is zero unless two axes are nearly parallel. Without beta,
+nearly parallel axes may need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations

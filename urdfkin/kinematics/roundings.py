@@ -263,7 +263,7 @@ PINOCCHIO_ROUNDINGS = 24.0
 #: `factors` is twice the number of factors that `PINOCCHIO_ROUNDINGS` defines.
 #: MuJoCo's terms have more factors, because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
-#: Allowed error (in eps) of a mimic rule of an MJCF file that MuJoCo evaluates.
+#: Allowed residual (in eps) of a mimic rule in an MJCF file, as computed by MuJoCo.
 MJCF_MIMIC_ROUNDINGS = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW_ROUNDINGS = 8.0

@@ -65,7 +65,8 @@ _PATIENCE = 4
 _EXACT_FIT_ERROR = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _EXACT_TIP_ERROR = 1e-12
-#: A fit with other joint signs must reduce the tip error to less than this fraction.
+#: A fit with other joint signs is accepted only if its tip error is less than this fraction of the
+#: smallest earlier tip error.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
 #: After a fit of the translations, another fit starts from the fitted table if the tip error is at most this
 #: fraction of the reach.
