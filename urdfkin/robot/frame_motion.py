@@ -126,8 +126,9 @@ class FrameMotion:
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
         """Return Yoshikawa's manipulability, the product of the singular values of the Jacobian J.
 
-        The product equals sqrt(det J J^T). If J has more rows than columns, the product equals
-        sqrt(det J^T J). Columns that are 0 for every q are left out, as in `Robot.singular_values`.
+        The product equals sqrt(det J J^T). If J has more rows than columns, det J J^T is 0, and the product
+        is sqrt(det J^T J) instead. Columns that are 0 for every q are left out, as in
+        `Robot.singular_values`.
 
         Args:
             rows: The rows of the Jacobian to use.

@@ -300,8 +300,8 @@ class UrdfError(UrdfkinError, ValueError):
     """A URDF has errors. The message lists the first five errors, each with file, line and column.
 
     Attributes:
-        findings: The findings of the file, including warnings and notes. `load` combines many findings with
-            the same code into one finding (`Finding.other_lines`).
+        findings: The findings of the file, including warnings and notes. If `load` raises the error, one
+            finding can represent several findings with the same code (`Finding.other_lines`).
 
     >>> import urdfkin
     >>> try:
@@ -680,7 +680,7 @@ def _sort_key(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
-    """Return the findings that are printed. The last one lists the line numbers of all other findings."""
+    """Return the findings that are printed. The last one lists the lines of the findings left out."""
     group.weighted_findings.sort(key=lambda pair: _sort_key(pair[0]))
     findings = [finding for finding, _ in group.weighted_findings]
     into_one = fold and group.severity is not Severity.ERROR

@@ -847,7 +847,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    """Return the most similar name in `known`; None if there is none.
+    """Return the name in `known` that is most similar to `word`, or None.
 
     Without a similar name, return a name with the same letters in another order.
     """

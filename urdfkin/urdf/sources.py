@@ -150,7 +150,7 @@ def read_source(
     """Read a URDF from any source.
 
     Read at most `max_bytes` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
-    `max_bytes` + 1 characters of an open text file. The last byte or character shows that the source is too
+    `max_bytes` + 1 characters of an open text file. If `max_bytes` + 1 are read, the source is too
     long.
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.

@@ -512,7 +512,7 @@ def _first_revolute_axes(
 
     A pair is an axis of A and an axis of B. Each item contains the first pair of revolute axes, all pairs of
     prismatic axes before this pair, and the result of `later_axes`. If the branches have no revolute axes,
-    the last pair of prismatic axes comes first.
+    the first entry is the last pair of prismatic axes.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):

@@ -453,8 +453,8 @@ def _common_variable_difference(
     `|R' - R| <= 2 |u' - u| + |c|`
     `|P' - P| <= |u' - u|`
 
-    If t and t' have different slopes m and m', the second derivative is at most m^2 r + m'^2 r'. Here r and
-    r' are the largest distances of y from the axes.
+    If t and t' have different slopes m and m', the length of the second derivative is at most
+    m^2 r + m'^2 r'. Here r and r' are the largest distances of y from the axes.
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b

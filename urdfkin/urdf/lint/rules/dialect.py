@@ -159,8 +159,8 @@ _VENDOR_NAMES_TEXT = (
 VENDOR_NAMES = frozenset(_VENDOR_NAMES_TEXT.split())
 
 #: Each line has the form `element: attributes > child elements`.
-#: The attributes of an element without a colon are not checked.
-#: Elements without a line are not checked.
+#: If a line has no colon, the attributes of the element are not checked.
+#: If an element has no line, the content of the element is not checked.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
