@@ -274,7 +274,8 @@ def calibrate(
 
     Raises:
         InputError: an array has a wrong shape, a number is not finite, there are no poses, or the positions
-            are not in metres. `source` is a table, and `tip` or `base` is not None.
+            are not in metres. Also raised if only one of `q` and `poses` is given, and if `tip` or `base` is
+            given for a table.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.

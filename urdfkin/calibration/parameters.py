@@ -76,7 +76,8 @@ class ParametricMotion(ElementaryMotion):
     Attributes:
         parameter: Index of the parameter. A joint's motion has the index of the gain; None without a gain.
         joint: Index of the joint; None if the angle or length does not depend on a joint.
-        sense: 1 or -1. The angle or length is multiplied by this sign.
+        sense: Sign of the angle or length: -1 if the path leads from child to parent, or if the row subtracts
+            the joint's value. Else 1.
     """
 
     parameter: int | None

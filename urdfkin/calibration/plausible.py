@@ -372,7 +372,7 @@ class _Trial:
         self.measurements = Measurements(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = estimate_start_values(model, self.measurements)
         errors_before = _norm(compute_residuals(model, self.measurements, self.start), original.reach)
-        #: Rms error (m) of the poses that the model predicts with the start values, before the fit.
+        #: Rms error (m) of the poses for the start values; rotations (rad) are multiplied by the reach.
         #: Base and tool are computed from the poses, and the other parameters have their original values.
         self.error_before = errors_before / math.sqrt(len(self.measurements))
 

@@ -88,8 +88,9 @@ derivation_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rows that contain the offsets d of consecutive parallel axes. last: the last row contains their sum."
-        " first: the first row contains their sum. each: each row contains the offset of its own link.",
+        "Rows that contain the offsets d of consecutive parallel axes. last: the last of these rows"
+        " contains their sum. first: the first of these rows contains their sum. each: each row contains the"
+        " offset of its own link.",
     ),
     click.option(
         "--flip",

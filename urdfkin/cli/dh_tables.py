@@ -66,8 +66,9 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `dh_arguments` contains the keyword arguments of `Robot.dh`. `unchanged_table` is the path of the table
-    ROBOT, or None if the command derives a new table.
+    `dh_arguments` contains the keyword arguments of `Robot.dh`. `unchanged_table` is the path of ROBOT
+    if this file contains a table or screws, and no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given.
+    Otherwise, it is None.
     """
 
     robot: Robot

@@ -35,7 +35,8 @@ def find_answer(topic: str) -> str | None:
     """Return the section of docs/questions.md about a topic.
 
     The function first searches for the section with the anchor `topic`. If there is none, the
-    function searches for anchors with all words of `topic`. The result is None unless there is exactly one.
+    function searches for anchors with all words of `topic`. If this second search does not find exactly one
+    anchor, the result is None.
     """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]

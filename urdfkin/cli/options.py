@@ -224,8 +224,8 @@ robot_options = combine(
         metavar="NAMES",
         expose_value=False,
         callback=_store_as("joints", lambda words: [name.strip() for name in words.split(",")]),
-        help="Keep only these joints, separated by commas. All other joints are fixed at their --lock values."
-        " A joint without a --lock value is fixed at 0.",
+        help="Keep only these joints, separated by commas. All other joints are fixed at their --lock values,"
+        " or at 0 without such a value.",
     ),
 )
 robot_argument = combine(

@@ -149,7 +149,7 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Find an entry of `data` that `document` does not have.
+    """Find an entry of `data` that is missing in `document`, the conversion of `data`.
 
     Return the JSON path of the mapping with the entry, and a message. Return None if there is no such entry.
     """
