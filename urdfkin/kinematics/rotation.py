@@ -574,9 +574,9 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGUL
 
     The three components of this equation give the rates:
 
-    `r_3 = w'_other / across`
-    `r_2 = w'_second`
-    `r_1 = w'_first - along r_3`
+        r_3 = w'_other / across
+        r_2 = w'_second
+        r_1 = w'_first - along r_3
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)

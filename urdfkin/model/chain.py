@@ -72,7 +72,8 @@ class FrameChain(Displayable):
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame, or in the base frame without joints.
+        T_last_tip: (4, 4) pose of the tip in the frame after the last motion M_n. If the path has no joints,
+            the pose of the tip in the base frame.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
             upper bound on the translation in A_k. The bound does not depend on the fixed joints' rotations.
         pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.

@@ -110,7 +110,11 @@ class Recursion:
         return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
-        """`rates` has the linear and angular velocity and acceleration of the joint, in the child's axes."""
+        """Return the state after a planar or floating joint.
+
+        The order of `rates` is linear velocity, angular velocity, linear acceleration, angular acceleration.
+        They are the joint's, in the child's axes.
+        """
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
         return replace(

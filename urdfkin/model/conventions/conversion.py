@@ -2,13 +2,14 @@
 
 The target program has these joint velocities, joint accelerations and Jacobians:
 
-`v_tool = M v`
-`a_tool = M a + M' v`
-`J_tool = S J M^-1`
+    v_tool = M v
+    a_tool = M a + M' v
+    J_tool = S J M^-1
 
 M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
-rows if the target program has the angular rows first. M depends on q only if the target program and urdfkin
-use different axes for the velocity of a floating or planar joint.
+rows if the target program has the angular rows first. urdfkin expresses the velocity of a floating or planar
+joint in the axes of the child link. M depends on q if, and only if, the target program expresses such a
+velocity, or its linear or angular part, in the axes of the parent link.
 """
 
 from __future__ import annotations
@@ -811,7 +812,11 @@ class Reordering:
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the reordering that converts "q" or "v" from one convention to another, or None.
 
-    A `Reordering` cannot convert angles to cosines, or change a velocity's frame.
+    The result is None if the robot has one of these numbers:
+
+    - an angle that only one convention stores as cosine and sine
+    - a cosine and sine of angles with different signs, units or zeros in the two conventions
+    - the velocity of a planar or floating joint, with different axes or points in the two conventions
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
