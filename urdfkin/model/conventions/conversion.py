@@ -14,6 +14,7 @@ velocity, or its linear or angular part, in the axes of the parent link.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -257,15 +258,25 @@ class Conversion:
             factor = rule.sign * (how.angle_factor if turns else 1.0)
         multiplier, offset = (joint.mimic.multiplier, joint.mimic.offset) if joint.mimic else (1.0, 0.0)
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
-        is_mimic, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
+        is_mimic = bool(joint.mimic)
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
+            # The cosine and sine need an angle in rad, whatever the convention's unit of angles is.
+            size, sign = abs(factor), math.copysign(1.0, factor)
             self._columns += [
-                _TargetNumber(f"{name}.{part}", q, factor, zero, part, is_mimic=is_mimic)
+                _TargetNumber(
+                    f"{name}.{part}",
+                    q,
+                    sign * multiplier,
+                    sign * offset + rule.zero / size,
+                    part,
+                    is_mimic=is_mimic,
+                )
                 for part in ("cos", "sin")
             ]
         else:
-            self._columns.append(_TargetNumber(name, q, factor, zero, "", unit, is_mimic))
-        self._rates.append(_TargetNumber(name, v, factor, unit=unit, is_mimic=is_mimic))
+            zero = factor * offset + rule.zero
+            self._columns.append(_TargetNumber(name, q, factor * multiplier, zero, "", unit, is_mimic))
+        self._rates.append(_TargetNumber(name, v, factor * multiplier, unit=unit, is_mimic=is_mimic))
 
     def _add_floating(self, i: int, name: str, q: int, v: int) -> None:
         how, joint = self.convention, self.tree.joints[i]
@@ -815,7 +826,7 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
     The result is None if the robot has one of these numbers:
 
     - an angle that only one convention stores as cosine and sine
-    - a cosine and sine of angles with different signs, units or zeros in the two conventions
+    - the cosine and sine of an angle with different signs or zeros in the two conventions
     - the velocity of a planar or floating joint, with different axes or points in the two conventions
 
     >>> import urdfkin
