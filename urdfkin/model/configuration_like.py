@@ -32,7 +32,6 @@ from urdfkin.kinematics.inputs import FloatArray, as_floats
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8
-#: Pattern of a blank between a number and its unit.
 _BLANK_BEFORE_UNIT = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _BLANKS_AROUND_OPERATORS = re.compile(r" ?([=*/]) ?")
 
