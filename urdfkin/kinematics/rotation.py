@@ -440,7 +440,7 @@ class EulerSequence:
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Reverse the last axis of an array if the rotation axes are fixed."""
+        """Convert the last axis between the order of `name` and the order first, second, third."""
         return values[..., ::-1] if self.is_fixed else values
 
 

@@ -82,9 +82,7 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the given values by name, and the numbers of the pose that `value` names.
-
-        The pose is None if the text names no pose.
+        """Return the given values by name, and the pose that `value` names, or None.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)

@@ -8,8 +8,8 @@ The target program has these joint velocities, joint accelerations and Jacobians
 
 M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
 rows if the target program has the angular rows first. urdfkin expresses the velocity of a floating or planar
-joint in the axes of the child link. M depends on q if, and only if, the target program expresses such a
-velocity, or its linear or angular part, in the axes of the parent link.
+joint in the axes of the child link. M depends on q if, and only if, the target program expresses a part of
+this velocity in the axes of the parent link.
 """
 
 from __future__ import annotations
