@@ -567,8 +567,8 @@ def euler_rates(
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE) -> FloatArray:
     """Return Omega^-1 in closed form (7.56).
 
-    F is the rotation by the first angle, and w' = F^T w. The rates r_1, r_2 and r_3 of the three angles
-    satisfy:
+    F is the rotation by the first angle, and w' = F^T w. In the axes after F, the third rotation axis is
+    `along e_first + across e_other`. The rates r_1, r_2 and r_3 of the three angles satisfy:
 
     `w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)`
 

@@ -95,8 +95,8 @@ class Recursion:
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
         """Return the state after a planar or floating joint.
 
-        The order of `rates` is linear velocity, angular velocity, linear acceleration, angular acceleration.
-        They are the joint's, in the child's axes.
+        `rates` are the joint's linear velocity, angular velocity, linear acceleration and angular
+        acceleration, in this order and in the child's axes.
         """
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)

@@ -131,10 +131,7 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule of a mimic joint.
-
-    The joint has the value multiplier * q_mimicked + offset. The mimicked joint is not a mimic joint.
-    """
+    """The rule multiplier * q_mimicked + offset; the mimicked joint is not a mimic joint."""
 
     mimicked_joint: str
     multiplier: float

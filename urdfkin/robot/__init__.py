@@ -684,7 +684,7 @@ class Robot(Displayable):
     def with_convention(
         self, name: str | Path | Convention, joints: Sequence[str] | None = None
     ) -> ConventionRobot:
-        """Return this robot with methods whose arguments and results are in the convention of a program.
+        """Return this robot with methods that take and return numbers in another program's convention.
 
         The arguments are those of `convention`.
 
