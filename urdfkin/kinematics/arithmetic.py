@@ -37,8 +37,7 @@ def rebind_functions(
     decorated.
 
     Args:
-        modules: Modules in import order. For example, `outputs` imports from `recursion` and therefore
-            follows `recursion`.
+        modules: Modules, each after the modules from which it imports.
         decorate: Decorator of each copy.
         replacements: Functions or modules by name.
     """

@@ -452,7 +452,6 @@ def _names(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return messages about values outside limits."""
     return [words for _, words in _violations(tree, q)]
 
 

@@ -46,11 +46,9 @@ class CoordinateLayout:
     """Names and units of q, v or a.
 
     Attributes:
-        symbol: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit, or None for an unknown unit.
         spans: First index and number of coordinates of each joint that has several coordinates.
         hints_by_name: Hints in errors about a joint without a coordinate, by the joint's name.
-        hints_by_length: Hints in errors about a wrong length, by the length.
     """
 
     symbol: str

@@ -1685,7 +1685,6 @@ class Robot(Displayable):
         verify: Verify | None,
         threads: int | None,
     ) -> PreparedFrame | None:
-        """Return the fast evaluator for a call, or None if no fast evaluator supports the call."""
         policy = self.verifier.policy if verify is None else verify
         if base is not None or threads is not None or (policy is not True and policy is not False):
             return None

@@ -402,7 +402,6 @@ def make_robot(
 
 
 def _find_unverified_reason(findings: tuple[Finding, ...]) -> str | None:
-    """Return why Pinocchio cannot check the robot, or None."""
     problems = {
         PinocchioReading.REFUSES: "Pinocchio refuses the file",
         PinocchioReading.DIFFERS: "Pinocchio reads another robot",

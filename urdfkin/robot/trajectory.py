@@ -275,7 +275,6 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
-    """Read the samples of a file; a missing t, v or a becomes None."""
     archive = path.suffix.lower() == ".npz"
     data = _read_npz(path, conversion or robot) if archive else _read_table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -717,7 +716,6 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint that has another pose after the unwrapping."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):
