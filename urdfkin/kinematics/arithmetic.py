@@ -19,9 +19,7 @@ VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transp
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return copies of the functions in `equations` that call replacements such as `plus` and `cross`.
-
-    `vectors` contains the replacements by name. `decorate` is applied to each copy.
+    """Return copies of the functions in `equations` that call the replacements `vectors`.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -35,12 +33,12 @@ def rebind_functions(
 ) -> dict[str, Any]:
     """Return copies of all functions of the modules, by name.
 
-    Each copy calls copied functions and replacements instead of the original functions.
+    Each copy calls copied functions and replacements instead of the original functions. A replacement is not
+    decorated.
 
     Args:
-        modules: Modules in import order. For example, `outputs` imports from `recursion` and therefore
-            follows `recursion`.
-        decorate: Decorator of each copy. A replacement of a copied function is not decorated.
+        modules: Modules, each after the modules from which it imports.
+        decorate: Decorator of each copy.
         replacements: Functions or modules by name.
     """
     copies: dict[str, Any] = {}

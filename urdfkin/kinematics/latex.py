@@ -51,14 +51,8 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression.
-
-    Attributes:
-        kind: `_ATOM`, `_CROSS` or `_SUM`.
-    """
-
     text: str
-    kind: int = _ATOM
+    kind: int = _ATOM  #: `_ATOM`, `_CROSS` or `_SUM`.
 
     def add_brackets(self, kind: int) -> str:
         return f"({self.text})" if self.kind >= kind else self.text

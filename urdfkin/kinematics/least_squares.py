@@ -17,8 +17,7 @@ Intermediate = TypeVar("Intermediate")
 _MOST_STEPS = 100
 #: First, smallest and largest damping, as multiples of the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: The damping is multiplied by the first factor after an accepted step.
-#: The damping is multiplied by the second factor after a rejected step.
+#: Factors of the damping after an accepted step and after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
 #: A step is slow if the new error is more than this fraction of the old error.
 _SLOW_STEP_RATIO = 0.99

@@ -24,21 +24,21 @@ _Z = 1.0  #: Length of a joint's axis.
 
 
 def translate_point(state: LinkBounds, d: Length) -> LinkBounds:
-    """Return the bounds at the distance d (7.58, 7.128, 7.130)."""
+    """7.58, 7.128, 7.130: point at the distance d."""
     p, w, vel, alpha, acc = state
     p, vel = eq.point_position(p, None, d), eq.point_velocity(vel, w, d)
     return p, w, vel, alpha, eq.point_acceleration(acc, alpha, w, d)
 
 
 def after_revolute(state: LinkBounds, d: Length, o: Length, o_rate: Length) -> LinkBounds:
-    """Return the child link's `LinkBounds` for a revolute joint (7.127, 7.129)."""
+    """7.127, 7.129: revolute joint."""
     p, w, vel, alpha, acc = translate_point(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
 
 
 def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> LinkBounds:
-    """Return the child link's `LinkBounds` for a prismatic joint (7.128, 7.130)."""
+    """7.128, 7.130: prismatic joint."""
     p, w, vel, alpha, acc = translate_point(state, d)
     return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
 
@@ -46,7 +46,7 @@ def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> 
 def after_free_joint(
     state: LinkBounds, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length
 ) -> LinkBounds:
-    """Return the child link's `LinkBounds` for a planar or floating joint."""
+    """7.129, 7.130: planar or floating joint."""
     p, w, vel, alpha, acc = translate_point(state, d)
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)

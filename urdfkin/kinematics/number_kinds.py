@@ -49,9 +49,7 @@ Length = Any
 
 
 def product(x: Length, y: Length) -> Length:
-    """Return the product x y of two lengths.
-
-    The product of nonzero lengths is at least `SMALLEST_NORMAL`.
+    """Return x y, but at least `SMALLEST_NORMAL` for nonzero lengths.
 
     >>> product(1e-200, 1e-200) == SMALLEST_NORMAL, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
     (True, 0.0, array([6.]))
@@ -67,9 +65,7 @@ def product(x: Length, y: Length) -> Length:
 
 
 def magnitude(x: FloatArray) -> FloatArray:
-    """Return the absolute values |x|.
-
-    The returned value of a nonzero number is at least `SMALLEST_NORMAL`.
+    """Return |x|, but at least `SMALLEST_NORMAL` for nonzero numbers.
 
     >>> magnitude(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST_NORMAL, 2.0]
     True
@@ -78,10 +74,7 @@ def magnitude(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths (...) of vectors (..., n).
-
-    The returned length of a nonzero vector is at least `SMALLEST_NORMAL`.
-    """
+    """Return the lengths (...) of vectors (..., n), at least `SMALLEST_NORMAL` for nonzero vectors."""
     return magnitude(
         np.hypot.reduce(x, axis=-1)
     )  # Squares could underflow or overflow, but np.hypot does not.

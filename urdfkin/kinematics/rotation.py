@@ -440,7 +440,7 @@ class EulerSequence:
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Reverse the last axis of an array if the rotation axes are fixed."""
+        """Convert the last axis between the order of `name` and the order first, second, third."""
         return values[..., ::-1] if self.is_fixed else values
 
 
@@ -567,16 +567,16 @@ def euler_rates(
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE) -> FloatArray:
     """Return Omega^-1 in closed form (7.56).
 
-    F is the rotation by the first angle, and w' = F^T w. The rates r_1, r_2 and r_3 of the three angles
-    satisfy:
+    F is the rotation by the first angle, and w' = F^T w. In the axes after F, the third rotation axis is
+    `along e_first + across e_other`. The rates r_1, r_2 and r_3 of the three angles satisfy:
 
     `w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)`
 
     The three components of this equation give the rates:
 
-    `r_3 = w'_other / across`
-    `r_2 = w'_second`
-    `r_1 = w'_first - along r_3`
+        r_3 = w'_other / across
+        r_2 = w'_second
+        r_1 = w'_first - along r_3
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)

@@ -211,11 +211,12 @@ With k mimic rules between the mimic joint and the independent joint, the tolera
 
 `MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)`
 
-**Numbers near zero.** A product below the smallest normal number n loses bits. The smallest subnormal number
-is eps n = 2^-1074, so the error of the product is at most 2^-1075. Every nonzero scale is at least n
+**Numbers near zero.** Let n = 2^-1022 be the smallest normal number. A product below n loses bits. The
+smallest subnormal number is eps n, so the error of the product is at most eps n / 2. Every nonzero scale is
+at least n
 (`urdfkin.kinematics.number_kinds`). Therefore, the tolerance is larger than this error:
 
-`count * eps * scale >= count * eps n > 2^-1075`
+`count * eps * scale >= count * eps n > eps n / 2`
 
 A later product with a large number multiplies the error and the scale by the same factor.
 
@@ -341,8 +342,8 @@ def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
     `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 
-    `joints` is usually the number that `PINOCCHIO_ROUNDINGS` defines. `tilt` is the sum of the tilts (rad) of
-    the path's joints.
+    The caller counts the joints; `PINOCCHIO_ROUNDINGS` describes the usual count. `tilt` is the sum of the
+    tilts (rad) of the path's joints.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]

@@ -72,7 +72,8 @@ class FrameChain(Displayable):
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame, or in the base frame without joints.
+        T_last_tip: (4, 4) pose of the tip in the frame after the last motion M_n. If the path has no joints,
+            the pose of the tip in the base frame.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
             upper bound on the translation in A_k. The bound does not depend on the fixed joints' rotations.
         pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.
@@ -267,8 +268,8 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # On a path from child to parent, a rotation to the joint's axis comes first. The joint's motion
-            # and the joint's constant pose follow. The rotation and the pose each count as one pose.
+            # On a path from child to parent, a rotation to the joint's axis comes before the joint's motion.
+            # The joint's constant pose comes after the motion, and counts as one more pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
@@ -277,11 +278,7 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
 
 
 def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
-    """Return the joints from `base` to `tip`.
-
-    Returns:
-        Pairs of a joint and a bool, which is True if the path leads from child to parent.
-    """
+    """Return the joints from `base` to `tip`, each with True if the path leads from child to parent."""
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0
     while common < min(len(up), len(down)) and up[common] == down[common]:

@@ -48,10 +48,7 @@ from urdfkin.model.tree import (
 
 #: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
 #: If the limits of a joint exclude all of these values, `sample` draws larger values.
-#: For a revolute or prismatic joint without limits, `sample` draws from -10 to 10 (rad or m).
-#: For a continuous joint, `sample` draws from -pi to pi.
-#: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
-#: These are planar joints, floating joints, and prismatic joints without limits.
+#: Some upper bounds assume that joints without limits travel at most this distance (m) from zero.
 #: Few linear axes of robots are longer than 10 m.
 ASSUMED_LIMIT = 10.0
 #: Text of the condition under which an upper bound holds.
@@ -97,20 +94,16 @@ def largest_value(limit: Limit | None) -> float:
 
 
 def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
-    """Draw uniform random values.
-
-    Returns:
-        (count, ranges) values.
-    """
+    """Draw uniform random values (count, ranges)."""
     lower, upper = np.array(ranges).reshape(-1, 2).T
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint that has one coordinate.
+    """Return the range of each joint that has one coordinate, without regard to mimic joints.
 
-    A range is limited to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. A range outside this interval
-    is limited to the length `ASSUMED_LIMIT`, from its end nearest to 0. Limits of mimic joints are ignored.
+    A range is cut to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. If a range is outside this
+    interval, only its part of length `ASSUMED_LIMIT` nearest to 0 remains.
     """
 
     def own_range(joint: Joint) -> tuple[float, float]:
@@ -192,8 +185,7 @@ def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: `from_pinocchio` allows this deviation of a mimic joint's values from the mimic rule:
-#:     `_MIMIC_TOLERANCE * max(1, largest absolute value)`
+#: Allowed deviation from a mimic rule in `from_pinocchio`, per max(1, largest absolute value).
 _MIMIC_TOLERANCE = 1e-9
 
 
@@ -237,10 +229,7 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
-    """Return "rad", "m" or "" for each number of q, v or a.
-
-    The time unit is omitted.
-    """
+    """Return "rad", "m" or "" for each number of q, v or a, without the time unit."""
     return tuple(
         unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if symbol == "q" else _VELOCITY_SUFFIXES)
     )
@@ -318,7 +307,7 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def named_poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named poses.
 
-    In `ready`, a joint without a value is at 0. If 0 is outside its range, the joint is in the middle.
+    In `ready`, a joint without a value is at 0, or in the middle of a range that excludes 0.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -338,8 +327,8 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value of each locked joint, rad or m.
 
-    If `lock` names a joint without a value, the joint is locked at the value of the named pose. The value is
-    0 if `lock` names no pose. If `joints` is given, all other joints are locked.
+    If `joints` is given, all other joints are locked. A locked joint without a value in `lock` has the value
+    of the pose that `lock` names, or 0.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
@@ -410,7 +399,6 @@ def velocity_limits(tree: KinematicTree) -> FloatArray:
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Normalise the quaternions of floating joints."""
     if not tree.floating_joints:
         return q
     q = q.copy()
@@ -464,7 +452,6 @@ def _names(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return messages about values outside limits."""
     return [words for _, words in _violations(tree, q)]
 
 
@@ -618,15 +605,13 @@ _MAX_SAMPLED_POSITION = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Random configurations, velocities and accelerations."""
-
     q: FloatArray
     v: FloatArray
     a: FloatArray
 
 
 def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
-    """Draw random configurations."""
+    """Draw random configurations (n, nq) within `coordinate_ranges`."""
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
 
@@ -661,7 +646,7 @@ _SAMPLERS = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_float
 
 
 def zero_and_limit_configurations(tree: KinematicTree) -> FloatArray:
-    """Return the zero, lower-limit and upper-limit configurations."""
+    """Return (3, nq): zero, all lower limits and all upper limits."""
     q = np.tile(neutral(tree), (3, 1))
     ranges = joint_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -685,9 +670,8 @@ def draw_samples(
 ) -> Samples:
     """Draw random samples for a validation.
 
-    A mimic joint may exceed its limits, because the equations are also valid there.
-    In every eighth sample, large velocities make the quadratic terms of the acceleration dominant (7.129,
-    7.130).
+    A mimic joint may exceed its limits, because the equations are also valid there. In every eighth sample,
+    large velocities make the quadratic terms of the acceleration dominant (7.129, 7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_zero_and_limits:

@@ -32,7 +32,6 @@ from urdfkin.kinematics.inputs import FloatArray, as_floats
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8
-#: Pattern of a blank between a number and its unit.
 _BLANK_BEFORE_UNIT = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _BLANKS_AROUND_OPERATORS = re.compile(r" ?([=*/]) ?")
 
@@ -47,11 +46,9 @@ class CoordinateLayout:
     """Names and units of q, v or a.
 
     Attributes:
-        symbol: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit, or None for an unknown unit.
         spans: First index and number of coordinates of each joint that has several coordinates.
         hints_by_name: Hints in errors about a joint without a coordinate, by the joint's name.
-        hints_by_length: Hints in errors about a wrong length, by the length.
     """
 
     symbol: str
@@ -83,9 +80,7 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the given values by name, and the numbers of the pose that `value` names.
-
-        The pose is None if the text names no pose.
+        """Return the given values by name, and the pose that `value` names, or None.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)

@@ -6,9 +6,9 @@ and -. The two functions agree with Pinocchio's functions of the same names. For
 a planar or floating joint, the joint velocity (w, s) is constant in the moving frame, so the joint makes a
 screw motion from the pose (R_0, p_0):
 
-`R = R_0 exp(w)`
-`p = p_0 + R_0 V(w) s`
-`V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2`
+    R = R_0 exp(w)
+    p = p_0 + R_0 V(w) s
+    V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2
 
 The product of the matrix [w] and a vector is the cross product of w and the vector.
 """

@@ -52,7 +52,6 @@ class Coupling:
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The constant terms g of the joint values G q + g."""
         return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, symbol: str = "q") -> CoordinateLayout:

@@ -33,12 +33,9 @@ _IDENTITY = np.eye(4)
 
 @dataclass(frozen=True, slots=True)
 class ElementaryMotion:
-    """A rotation about, or translation along, a coordinate axis.
+    """A rotation about, or translation along, a coordinate axis."""
 
-    `axis` is 0 for x, 1 for y and 2 for z.
-    """
-
-    axis: int
+    axis: int  #: 0 for x, 1 for y, 2 for z.
     turns: bool
 
 
@@ -58,11 +55,7 @@ class Path:
     steps: tuple[FloatArray | ElementaryMotion, ...]
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
-        """Return the poses after each step.
-
-        Returns:
-            (..., steps, 4, 4) poses.
-        """
+        """Return the poses (..., steps, 4, 4) after each step."""
         amounts = np.asarray(amounts, np.float64)
         frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
         for i, T in enumerate(self._after_each_step(amounts)):
@@ -93,11 +86,7 @@ class Path:
         return np.array(T)
 
     def pose_and_jacobian(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the pose and Jacobian at the path's end.
-
-        Returns:
-            (..., 4, 4) pose and (..., 6, motions) Jacobian, [linear; angular].
-        """
+        """Return the end's pose (..., 4, 4) and Jacobian (..., 6, motions), [linear; angular]."""
         return self.pose_and_jacobian_from_frames(self.frames(amounts))
 
     def pose_and_jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,7 +1,6 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-The attribute `Recursion.eq` contains the textbook's equations for one kind of number, such as NumPy arrays.
-The function `urdfkin.kinematics.arithmetic.bind_equations` makes these equations.
+`urdfkin.kinematics.arithmetic.bind_equations` makes the textbook's equations for one kind of number.
 """
 
 from __future__ import annotations
@@ -25,11 +24,7 @@ IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 @dataclass(frozen=True, slots=True)
 class LinkState:
-    """The pose, velocity and acceleration of a link.
-
-    R and p are in world axes.
-    `Recursion.own_axes` determines the axes of w, vel, alpha and acc.
-    """
+    """R and p are in world axes; `Recursion.own_axes` determines the axes of the other vectors."""
 
     R: Matrix = IDENTITY
     p: Vector = ZERO
@@ -41,33 +36,22 @@ class LinkState:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One Jacobian column of a joint.
-
-    Attributes:
-        carrier: State of the frame to which the axis is fixed.
-        order: Index of the joint on the path; the index increases from the base.
-        factor: Multiplier of the mimic rule.
-    """
+    """One Jacobian column of a joint."""
 
     z: Vector
     turns: bool
-    carrier: LinkState
-    order: int
+    carrier: LinkState  #: State of the frame to which the axis is fixed.
+    order: int  #: Index of the joint on the path from the base.
     v_index: int
-    factor: Number
+    factor: Number  #: Multiplier of the mimic rule.
 
 
 @dataclass(eq=False)
 class Recursion:
-    """The steps of the forward recursion.
+    """The steps of the forward recursion."""
 
-    Attributes:
-        eq: The textbook's equations.
-        own_axes: Whether velocities and accelerations are in the link's axes, not in world axes.
-    """
-
-    eq: Any
-    own_axes: bool = False
+    eq: Any  #: The textbook's equations for one kind of number.
+    own_axes: bool = False  #: Whether velocities and accelerations are in the link's axes, not in world axes.
 
     def express(self, s: LinkState, x: Vector) -> Vector:
         return x if self.own_axes else self.eq.rotate(s.R, x)
@@ -79,7 +63,6 @@ class Recursion:
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
     def rotate_frame(self, s: LinkState, S: Matrix) -> LinkState:
-        """Rotate the frame by S."""
         R = self.eq.product(s.R, S)
         if not self.own_axes:
             return replace(s, R=R)
@@ -110,7 +93,11 @@ class Recursion:
         return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
-        """`rates` has the linear and angular velocity and acceleration of the joint, in the child's axes."""
+        """Return the state after a planar or floating joint.
+
+        `rates` are the joint's linear velocity, angular velocity, linear acceleration and angular
+        acceleration, in this order and in the child's axes.
+        """
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
         return replace(
@@ -194,10 +181,9 @@ class Recursion:
     def hessian(
         self, s: LinkState, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
-        """Yield the derivatives of the columns.
+        """Yield tuples (i, j, factor, x), where i and j are indices of v.
 
-        The tuples are (i, j, factor, x), where i and j are indices of v. The derivative of column i with
-        respect to q_j is the sum of factor * x over all tuples with these indices.
+        The derivative of column i with respect to q_j is the sum of factor * x over all tuples (i, j, ...).
         """
         point = ZERO if reference.at_world else s.p
         computed = [(one, self._column(one, point)) for one in columns]
@@ -216,14 +202,7 @@ class Recursion:
     def _column_derivative(
         self, column_i: Any, column_j: Any, reference: Reference, *, is_before: bool
     ) -> tuple[Vector, Vector]:
-        """Return d(column i)/dq_j.
-
-        Args:
-            column_i: Linear and angular part of column i.
-            column_j: Linear and angular part of column j.
-            reference: Reference frame of the columns.
-            is_before: Whether joint j is joint i or precedes joint i on the path.
-        """
+        """Return d(column i)/dq_j; `is_before` means that joint j precedes joint i, or is joint i."""
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO
         match reference:

@@ -24,7 +24,7 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: Whether the results are in the frame's axes, not in the world's axes.
-    at_world: bool  #: Whether the results are for the body point at the world's origin.
+    at_world: bool  #: Whether the linear motion is of the body point at the world's origin.
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
         member = int.__new__(cls, number)

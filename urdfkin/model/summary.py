@@ -11,7 +11,6 @@ from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Left-aligned columns in the table of `summarize_robot`.
 LEFT_ALIGNED_COLUMNS = (0, 1, 2, 3, 4, 5, 9)
 _LEFT_ALIGNED_JOINT_COLUMNS = (0, 1, 2, *(i + 1 for i in LEFT_ALIGNED_COLUMNS[2:]))
 

@@ -52,10 +52,7 @@ class LinkFrame(FrameName):
 
 
 class JointFrame(FrameName):
-    """The name of a joint with the prefix "joint:".
-
-    The frame is the child link's frame.
-    """
+    """The prefix "joint:" and a joint's name, for the frame of the joint's child link."""
 
     __slots__ = ()
     prefix = "joint:"
@@ -112,10 +109,9 @@ class Limit:
 
 #: Largest plausible |joint angle| (rad): some industrial wrists turn 400 degrees in each direction.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A joint value is far outside the limits if both of the following conditions hold.
-#: The value exceeds a limit by more than `_MARGIN` (rad or m).
-#: The value exceeds this limit by more than `_MARGIN_FRACTION` times the joint's range.
-#: For a joint with only one limit, every value that exceeds this limit counts as far outside the limits.
+#: A joint value is far outside the limits if it exceeds a limit by more than the larger of two margins.
+#: The margins are `_MARGIN` (rad or m) and `_MARGIN_FRACTION` times the joint's range.
+#: For a joint with only one limit, the margin is 0.
 _MARGIN, _MARGIN_FRACTION = 0.5, 0.25
 
 
@@ -135,10 +131,7 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule of a mimic joint.
-
-    The joint has the value multiplier * q_mimicked + offset. The mimicked joint is not a mimic joint.
-    """
+    """The rule multiplier * q_mimicked + offset; the mimicked joint is not a mimic joint."""
 
     mimicked_joint: str
     multiplier: float
@@ -474,10 +467,7 @@ def with_pinocchio_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> Kin
 
 
 def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Replace the tree's named poses.
-
-    Only values of independent joints with one coordinate are kept.
-    """
+    """Replace the named poses, and drop values of mimic joints and of joints with several coordinates."""
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()
@@ -486,10 +476,7 @@ def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Lock joints at values, rad or m.
-
-    Joints that mimic a locked joint are locked too.
-    """
+    """Lock joints, and the joints that mimic them, at values in rad or m."""
     independent_joints = [joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in tree.joints]
     joints = [
         Lock(joint, values[mimicked_joint]).make_fixed_joint() if mimicked_joint in values else joint

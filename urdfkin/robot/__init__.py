@@ -162,20 +162,16 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds on the errors of poses from a USD stage.
-        #: The stage stores poses in single precision.
-        #: Without a USD stage, the value is None.
+        #: Bounds on the errors of poses from a USD stage in single precision; None without a USD stage.
         self.single: SinglePrecisionErrors | None = None
-        #: USD path of each link's prim (scene object).
-        #: Without a USD stage, the value is empty.
+        #: USD path of each link's prim (scene object); empty without a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Cached evaluators. Pinocchio does not check the results of these evaluators.
+        # Pinocchio checks each result of the evaluators in `_checked`, and no result of those in `_prepared`.
         self._prepared: dict[object, PreparedFrame] = {}
-        #: Cached evaluators. Pinocchio checks each result of these evaluators.
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
@@ -531,8 +527,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # The returned lines mention values that are probably in degrees.
-        # `warn=False` prevents an additional warning about such values.
+        # The returned lines mention values that are probably in degrees, so a warning is not needed.
         q = configuration.parse_finite(self.tree, q, "q", warn=False)
         return configuration.limit_violations(self.tree, q)
 
@@ -689,7 +684,7 @@ class Robot(Displayable):
     def with_convention(
         self, name: str | Path | Convention, joints: Sequence[str] | None = None
     ) -> ConventionRobot:
-        """Return this robot with methods whose arguments and results are in the convention of a program.
+        """Return this robot with methods that take and return numbers in another program's convention.
 
         The arguments are those of `convention`.
 
@@ -1638,7 +1633,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the compiled tree for some links, and cache this tree; `links` contains link indices."""
+        """Return the compiled tree for the link indices `links`, from a cache."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1690,7 +1685,6 @@ class Robot(Displayable):
         verify: Verify | None,
         threads: int | None,
     ) -> PreparedFrame | None:
-        """Return the fast evaluator for a call, or None if no fast evaluator supports the call."""
         policy = self.verifier.policy if verify is None else verify
         if base is not None or threads is not None or (policy is not True and policy is not False):
             return None
@@ -1731,8 +1725,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 def _merge_shared_items(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return a method's docstring with complete sections Args, Returns and Raises.
 
-    `shared` contains the descriptions of arguments, and `errors` contains the descriptions of errors. The
-    shape, the units and the equations of the result come from `QUANTITIES`.
+    `shared` describes arguments, `errors` describes errors, and `QUANTITIES` describes the result.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)

@@ -349,9 +349,8 @@ def make_robot(
 ) -> Robot:
     """Make a robot from URDF text. The arguments from `verify` to `joints` mean the same as in `load`.
 
-    `is_generated` states whether urdfkin generated the text from another source. `source_findings` contains
-    findings about this source. `table` states whether the source is a Denavit-Hartenberg table or a product
-    of exponentials. If `quiet` is True, no warnings are issued.
+    If urdfkin generated the text from another source, `source_findings` contains the findings about this
+    source. `table` is True for a source that is a Denavit-Hartenberg table or a product of exponentials.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle
@@ -403,7 +402,6 @@ def make_robot(
 
 
 def _find_unverified_reason(findings: tuple[Finding, ...]) -> str | None:
-    """Return why Pinocchio cannot check the robot, or None."""
     problems = {
         PinocchioReading.REFUSES: "Pinocchio refuses the file",
         PinocchioReading.DIFFERS: "Pinocchio reads another robot",

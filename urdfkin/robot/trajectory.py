@@ -1,18 +1,20 @@
 """Make trajectories from two configurations, or from the samples in a CSV or .npz file.
 
-*Line.* Let u = t / duration. A straight line between two configurations is parameterised by s = 10 u^3 - 15
-u^4 + 6 u^5. The motion starts and ends at rest, and the acceleration is continuous.
+*Line.* A straight line between two configurations has the parameter s, with u = t / duration:
 
-*Differences.* Joint velocities that a file does not contain are computed by central differences of the
-configurations. The error is proportional to the square of the time step. Joint accelerations that are
-computed from configurations have larger errors at the start and the end of the trajectory. The errors at the
-start and the end are proportional to the time step. To estimate all errors, the differences are also computed
-from every second sample.
+    s = 10 u^3 - 15 u^4 + 6 u^5
+
+The motion starts and ends at rest, and the acceleration is continuous.
+
+*Differences.* Joint velocities that a file lacks are central differences of the configurations. Their error
+is proportional to the square of the time step. At both ends of the trajectory, the error of joint
+accelerations from configurations is larger, and proportional to the time step. To estimate all errors, the
+differences are also computed from every second sample.
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
 At the end of this range, a wrapped angle jumps by one turn. The quaternion of a floating joint may change its
-sign without a change of orientation. Central differences would turn a jump into a large, wrong velocity.
-Therefore, the jumps are removed first.
+sign without a change of orientation. These jumps are removed first, because central differences would turn
+them into large, wrong velocities.
 """
 
 from __future__ import annotations
@@ -63,10 +65,6 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
     """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
 
     Pickled objects are rejected, because unpickling can execute code from the file.
-
-    Raises:
-        SourceError: the file cannot be read, or does not contain numbers.
-        InputError: an array is unknown, missing, of a wrong shape or not finite.
     """
     try:
         with np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False) as archive:
@@ -121,8 +119,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 #: Minimum number of samples; a second difference needs three.
 _MIN_SAMPLES = 3
-#: Names of the .npz arrays for the root link's motion:
-#: pose, velocity and acceleration.
+#: Names of the .npz arrays with the root link's pose, velocity and acceleration.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 #: Times cause a note if their rounding exceeds this fraction of the smallest step.
 _TIME_ROUNDING = 1e-6
@@ -225,9 +222,8 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # The velocity v is s' * step, and the acceleration a is s'' * step.
-    # Here s' and s'' are the first and the second time derivative of s.
     # For a planar or floating joint, `step` is a constant twist in the moving frame.
+    # Therefore, v and a of all joints are `step` times the time derivatives `s_1` and `s_2` of s.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -279,7 +275,6 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
-    """Read the samples of a file; a missing t, v or a becomes None."""
     archive = path.suffix.lower() == ".npz"
     data = _read_npz(path, conversion or robot) if archive else _read_table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -338,10 +333,7 @@ def _central_differences(
 
 
 def _estimate_error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of `fine` from `coarse`, which has twice the time step.
-
-    The error of `coarse` is larger than the error of `fine` by the factor 2^`order`.
-    """
+    """Estimate the largest error of `fine`; the error of `coarse` is 2^`order` times as large."""
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
@@ -397,10 +389,7 @@ def _read_npz(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 
 
 def _central_velocities(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return joint velocities (n, nv), computed by central differences.
-
-    The velocity of a planar or floating joint is expressed in the axes of the moving frame.
-    """
+    """Return joint velocities (n, nv); for planar and floating joints, in the moving frame's axes."""
     slopes = _differentiate(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -445,10 +434,9 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first remaining line may be a header: the names
-    of the columns, in any order. If `requires_header` is True, the text must have a header. Without a header,
-    the columns are `required`, in this order. A heading may end with a unit, such as `elbow [deg]`. `units`
-    contains the SI unit of each column that may have a unit.
+    Empty lines and lines that begin with # are skipped. The first other line may name the columns, in any
+    order. Otherwise, the columns are `required`. `units` contains the SI unit of each column that may have a
+    unit in its heading.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -498,9 +486,7 @@ _SUFFIXES = (
 
 
 def _parse_heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column name and the unit in a heading.
-
-    The unit is "" for an SI unit, and for a heading without a unit. The unit is "deg" also for "deg/s".
+    """Return the column name and the unit in a heading; the unit is "" if it is an SI unit or missing.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_parse_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -559,17 +545,14 @@ def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
 
 
 def count_cells(text: str, where: str) -> int:
-    """Return the number of cells in the first line that `_rows` yields, or 0 if `_rows` yields no line."""
+    """Return the number of cells in the first line that is neither empty nor a comment, or 0."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
 def parse_numbers(
     cells: Sequence[str], where: str, names: Sequence[str], question: QuestionsSection | None = None
 ) -> list[float]:
-    """Parse one number for each name.
-
-    If the number of cells is wrong, the error message refers to the section `question` of the documentation.
-    """
+    """Parse one number for each name."""
     if len(cells) != len(names):
         raise wrong_count_error(names, len(cells), where, question=question)
     values = []
@@ -733,7 +716,6 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint with a pose that depends on the unwrapping of the mimicked joint."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

@@ -47,8 +47,8 @@ class FrameJacobian:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, in world axes.
         error: (..., 6, nv) bounds on the errors of J.
-        is_revolute: (nv,) True for a revolute joint, False for a prismatic joint. None for a joint with
-            several columns, and for a joint with a mimic joint.
+        is_revolute: (nv,) True for the column of a revolute or continuous joint, False for a prismatic joint.
+            None for the columns of a planar or floating joint, and of a joint that another joint mimics.
         active_entries: (6, nv) False for entries of J that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
             base. A moving base can change the directions without motion.

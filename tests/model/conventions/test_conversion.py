@@ -464,6 +464,17 @@ def test_no_reordering_converts_the_cosine_of_a_joint_to_the_angle_of_its_mimic_
     assert find_reordering("q", start, end) is None
 
 
+def test_the_cosine_and_sine_of_a_joint_do_not_depend_on_the_unit_of_angles(tmp_path: Path) -> None:
+    arm = built(joint("a", "continuous", "l0", "l1", "", "0 0 1"), verify=False)
+    file = tmp_path / "degrees.toml"
+    file.write_text('like = "pinocchio"\nangle = "deg"\n[joint.a]\nsign = -1\nzero = 90\n')
+    program = arm.convention(file)
+    q, v = program.to([0.5], [1.0])
+    assert np.allclose(q, [np.cos(np.pi / 2 - 0.5), np.sin(np.pi / 2 - 0.5)], 0, 1e-15)
+    assert np.allclose(v, [-180 / np.pi], 0, 1e-13)
+    assert np.allclose(program.from_(q), [0.5], 0, 1e-15)
+
+
 def test_the_error_of_a_mimic_value_has_the_unit_of_the_convention(tmp_path: Path) -> None:
     arm = arm_with(rule_of_b=mimic("a", 2))
     (tmp_path / "degrees.toml").write_text('angle = "deg"\n')

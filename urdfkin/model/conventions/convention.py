@@ -59,11 +59,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class JointRule:
-    """The conversion of a joint value to another program's value.
-
-    The other program's value is computed from the joint value x (rad or m):
-
-    `factor * x + zero`
+    """The conversion of a joint value x (rad or m) to another program's value, `factor * x + zero`.
 
     `factor` includes `sign`.
 
@@ -163,10 +159,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
 
 def parse_convention(text: str, where: str, name: str) -> Convention:
-    """Parse a convention's TOML text.
-
-    `name` is the default for the convention's name and title.
-    """
+    """Parse a convention's TOML text; `name` is the default name and title."""
     try:
         entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

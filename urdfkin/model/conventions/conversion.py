@@ -2,17 +2,19 @@
 
 The target program has these joint velocities, joint accelerations and Jacobians:
 
-`v_tool = M v`
-`a_tool = M a + M' v`
-`J_tool = S J M^-1`
+    v_tool = M v
+    a_tool = M a + M' v
+    J_tool = S J M^-1
 
 M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
-rows if the target program has the angular rows first. M depends on q only if the target program and urdfkin
-use different axes for the velocity of a floating or planar joint.
+rows if the target program has the angular rows first. urdfkin expresses the velocity of a floating or planar
+joint in the axes of the child link. M depends on q if, and only if, the target program expresses a part of
+this velocity in the axes of the parent link.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -30,22 +32,16 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Allowed deviation from a mimic rule, in the target program's unit:
-#:     `_MIMIC_TOLERANCE * max(1, |factor|)`
-#: `factor` is an attribute of `_TargetNumber`.
+#: Allowed deviation from a mimic rule, in the target program's unit, per max(1, |`_TargetNumber.factor`|).
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True, slots=True)
 class _TargetNumber:
-    """One coordinate or one joint velocity of the target program.
+    """A number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
 
-    With urdfkin's q or v as x, the value is:
-
-    `y = factor * x[index] + zero`
-
-    If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y) instead.
+    If `cos_or_sin` is not empty, the number is the cosine or sine of this value.
     """
 
     name: str
@@ -59,20 +55,13 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A planar or floating joint with a block in `Conversion.matrix`.
-
-    Attributes:
-        q_index: First index in urdfkin's q.
-        v_index: First index in urdfkin's v.
-        target_slice: Indices in the target program's v.
-        velocity_point: (3,) the link's origin or centre of mass, in the link's frame (m).
-    """
+    """A planar or floating joint with a block in `Conversion.matrix`."""
 
     joint: Joint
-    q_index: int
-    v_index: int
-    target_slice: slice
-    velocity_point: FloatArray
+    q_index: int  #: First index in urdfkin's q.
+    v_index: int  #: First index in urdfkin's v.
+    target_slice: slice  #: Indices in the target program's v.
+    velocity_point: FloatArray  #: (3,) the link's origin or centre of mass, in the link's frame (m).
 
 
 class Conversion:
@@ -195,10 +184,7 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merge_fixed: bool
     ) -> list[int]:
-        """Sort siblings by `keys`.
-
-        If `merge_fixed` is true, two links with a fixed joint between them count as one link.
-        """
+        """Sort siblings by `keys`; `merge_fixed` counts links that fixed joints connect as one link."""
 
         def below(link: int) -> list[int]:
             joints, links = list[int](), [link]
@@ -256,15 +242,25 @@ class Conversion:
             factor = rule.sign * (how.angle_factor if turns else 1.0)
         multiplier, offset = (joint.mimic.multiplier, joint.mimic.offset) if joint.mimic else (1.0, 0.0)
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
-        is_mimic, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
+        is_mimic = bool(joint.mimic)
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
+            # The cosine and sine need an angle in rad, whatever the convention's unit of angles is.
+            size, sign = abs(factor), math.copysign(1.0, factor)
             self._columns += [
-                _TargetNumber(f"{name}.{part}", q, factor, zero, part, is_mimic=is_mimic)
+                _TargetNumber(
+                    f"{name}.{part}",
+                    q,
+                    sign * multiplier,
+                    sign * offset + rule.zero / size,
+                    part,
+                    is_mimic=is_mimic,
+                )
                 for part in ("cos", "sin")
             ]
         else:
-            self._columns.append(_TargetNumber(name, q, factor, zero, "", unit, is_mimic))
-        self._rates.append(_TargetNumber(name, v, factor, unit=unit, is_mimic=is_mimic))
+            zero = factor * offset + rule.zero
+            self._columns.append(_TargetNumber(name, q, factor * multiplier, zero, "", unit, is_mimic))
+        self._rates.append(_TargetNumber(name, v, factor * multiplier, unit=unit, is_mimic=is_mimic))
 
     def _add_floating(self, i: int, name: str, q: int, v: int) -> None:
         how, joint = self.convention, self.tree.joints[i]
@@ -615,9 +611,9 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the joint's part of `matrix`, (..., 3, 3) for a planar or (..., 6, 6) for a floating joint.
+        """Return the joint's part (..., 3, 3) or (..., 6, 6) of `matrix`, or the part's time derivative.
 
-        `q` is the robot's q. If the joint's velocity v is given, return the part's time derivative.
+        `q` is the robot's q. `v` is the joint's velocity, which only the derivative needs.
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -811,7 +807,11 @@ class Reordering:
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the reordering that converts "q" or "v" from one convention to another, or None.
 
-    A `Reordering` cannot convert angles to cosines, or change a velocity's frame.
+    The result is None if the robot has one of these numbers:
+
+    - an angle that only one convention stores as cosine and sine
+    - the cosine and sine of an angle with different signs or zeros in the two conventions
+    - the velocity of a planar or floating joint, with different axes or points in the two conventions
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -848,10 +848,7 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int | None:
-    """Return the index of a number that determines `target`, or None.
-
-    A mimic joint is used only if no other number determines `target`.
-    """
+    """Return the index of a number that determines `target`, preferably not a mimic joint's, or None."""
     candidates = (
         k
         for k, x in enumerate(numbers)
@@ -861,10 +858,7 @@ def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int
 
 
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Return the indices that reorder the target program's q or v as urdfkin's q or v.
-
-    If the target program has no coordinate for a mimicked joint, its mimic joint's index is used.
-    """
+    """Return an index in `numbers` for each of urdfkin's coordinates, preferably not a mimic joint's."""
     return [
         min(
             (k for k, x in enumerate(numbers) if x.index == at and x.factor),
