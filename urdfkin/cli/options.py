@@ -109,7 +109,6 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
 #: Number of samples that an option with the value `random` draws, for example `--q random`.
-#: With the value `random:N`, the option draws N samples.
 _RANDOM_SAMPLES = 1
 
 

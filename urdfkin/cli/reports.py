@@ -138,7 +138,10 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
     from urdfkin.validation.document import outcome_of
 
     if results is None:
-        raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
+        raise click.UsageError(
+            "RESULTS is missing: give the JSON file that `urdfkin validate --json` wrote, or the folder of"
+            " `--store`"
+        )
     if any(files.values()):
         reject_unused_options(context, ("cases",), "if the report is written to a file")
     document = read_stored_document(results) if is_folder(results) else read_document(results)

@@ -123,9 +123,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 def warm_command() -> None:
     """Compile all kernels (machine code) and store them, for container images and CI.
 
-    Without this command, urdfkin compiles a kernel only if computations take too long, for example large
-    batches. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME. On another
-    processor, the kernels are compiled again.
+    Without this command, urdfkin computes in plain Python at first. urdfkin compiles a kernel if plain Python
+    takes more than a second, for example for large batches. Each compilation takes some seconds. Kernels are
+    stored below XDG_CACHE_HOME. On another processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """

@@ -87,10 +87,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyStore | None]:
-    """Lock the store in `folder`, and yield the accuracy results in the store.
-
-    With `shard`, only the results of the given part are locked.
-    """
+    """Lock the store, or its part `shard`, and yield the accuracy results in the store."""
     if folder is None:
         yield None
         return

@@ -11,7 +11,6 @@ import math
 import re
 from typing import NamedTuple
 
-#: Pattern of a decimal number.
 #: The matching time is linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")

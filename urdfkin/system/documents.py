@@ -149,10 +149,7 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Find an entry of `data` that is missing in `document`, the conversion of `data`.
-
-    Return the JSON path of the mapping with the entry, and a message. Return None if there is no such entry.
-    """
+    """Return the place of an entry that `data` has and its conversion `document` lacks, and a message."""
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"
