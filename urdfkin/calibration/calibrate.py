@@ -98,9 +98,8 @@ class Calibration:
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to a ratio of two uncertainties.
-            The uncertainty at the measured configurations is divided by the uncertainty at equally many
-            random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to its uncertainty at the
+            measured configurations, divided by its uncertainty at equally many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -475,7 +474,7 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
 
-    Fewer parameters are identifiable if, for example, the original tip lies on the last joint's axis.
+    At the original values, fewer are identifiable, for example if the tip lies on the last joint's axis.
     """
     again = identify(
         model,

@@ -558,10 +558,7 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
 
 
 def _solve_base_tool_rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve R_B^T M_i = R_i R_X for R_B and R_X.
-
-    The linear form is M_i^T R_B - R_X^T R_i^T = 0.
-    """
+    """Solve R_B^T M_i = R_i R_X, in the linear form M_i^T R_B - R_X^T R_i^T = 0, for R_B and R_X."""
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)

@@ -197,7 +197,7 @@ ORIGIN_PARAMETERS = (
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
 #: Parameters in order of preference; False: prismatic joint, True: another joint, base or tool.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
-#: The order is: the joint's zero, its axis, its frame without its axis, and the gain.
+#: The order is: zero position, axis, other numbers of the joint's frame, gain.
 _ORIGIN_PREFERENCES = {
     True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
     False: ("z", "rx", "ry", "x", "y", "rz", "gain"),

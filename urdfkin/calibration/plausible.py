@@ -65,9 +65,10 @@ _CHANGE_MARGIN_SIGMAS = 5.0
 #: Largest error of a fit to corrected data, divided by the error of the original fit.
 #: The second ratio applies if the original fit is implausible, or changes a zero by about half a turn.
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
-#: All parameters are fitted only for this number of corrections, with the smallest `_Trial.error_before`.
+#: Maximum number of corrections for which all parameters are fitted.
+#: These are the corrections with the smallest `_Trial.error_before`.
 _MAX_FITS = 4
-#: Shifts of the rows of q relative to the poses that urdfkin tries.
+#: urdfkin tries these shifts of the rows of q relative to the poses.
 #: The shift k means that row i + k of q belongs to pose i.
 _ROW_SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
@@ -270,7 +271,7 @@ def _coordinates_with_limits(model: CalibrationModel) -> Iterator[tuple[str, boo
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Configurations after correcting one mistake; they belong to the poses [first_pose:end_pose]."""
+    """Configurations after correcting one mistake, for the slice first_pose:end_pose of the poses."""
 
     reason: str
     q: FloatArray

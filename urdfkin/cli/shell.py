@@ -23,8 +23,7 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Pattern of the names that completion offers.
-#: These names contain no character that a shell interprets.
+#: Completion offers only these names, because they contain no character that a shell interprets.
 #: The pattern also excludes colons, because Bash separates words at colons.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names

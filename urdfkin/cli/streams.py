@@ -43,10 +43,7 @@ def flush_output() -> None:
 
 
 class _RawStream(io.FileIO):
-    """A standard stream that handles write errors.
-
-    The first write error on stdout ends the command. Write errors on stderr are ignored.
-    """
+    """A standard stream; the first write error on stdout ends the command, errors on stderr are ignored."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)

@@ -59,7 +59,6 @@ def number_remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Short name of the unit for each accepted name.
 UNIT_SHORT_NAMES = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

@@ -45,7 +45,6 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
 INPUT_LETTERS = ("q", "v", "a")
-#: The results of these operations are always assigned to variables.
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement of exported code.
 _MAX_STATEMENT_OPERATIONS = 12
@@ -231,7 +230,7 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives by x, or add the error of a constant x to the bounds."""
+        """Add `slope` to the derivatives with respect to x, or add a constant's error to the bounds."""
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
         elif x in slopes:

@@ -101,7 +101,7 @@ def _unsafe_reason(folder: Path) -> str | None:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group has the current user's name, and no member except the current user."""
+    """Return whether a group is the private group that many systems create for each user."""
     try:
         name, entry = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:

@@ -149,7 +149,10 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the place of an entry that `data` has and its conversion `document` lacks, and a message."""
+    """Return the JSON path of an unknown entry, and a message.
+
+    `document` is the conversion of `data`, which omits unknown entries.
+    """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"

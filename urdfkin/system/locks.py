@@ -38,7 +38,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # If another thread registers `_before_fork` during this fork, this thread has no entry.
+    # If another thread registers `_before_fork` during this fork, `_acquired_locks` lacks this thread.
     for lock in reversed(_acquired_locks.pop(threading.get_ident(), [])):
         lock.release()
 
