@@ -11,11 +11,11 @@ joint is reversed. A fit is refused for any of these reasons:
 - The orientation error, the tilt of a joint's axis, or the change of a gain is large.
 - The fit has no redundancy.
 - Joint values look like degrees.
-- The fit is suspicious, and a correction of a common mistake in the data makes the fit much more accurate.
+- The fit is inaccurate, and a correction of a common mistake in the data makes the fit much more accurate.
+- The fit changes a joint's zero by about half a turn, and the fit is plausible after such a correction.
 
-To find the mistake behind a refused or suspicious fit, the module corrects common mistakes in the data, one
-at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest
-one.
+To find the likeliest mistake, the module corrects common mistakes in the data, one at a time, and fits again.
+The first correction with a plausible fit shows the likeliest mistake.
 """
 
 from __future__ import annotations
