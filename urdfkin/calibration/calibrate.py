@@ -64,15 +64,14 @@ from urdfkin.verify.certificate import Certificate
 #: Number of random configurations for `Calibration.general_identification`.
 _GENERAL_CONFIGURATIONS = 40
 #: A warning is given if `Fit.noise_ratio` differs from 1 by more than this number of standard deviations.
-#: The ratio compares the residuals with the noise that the user stated.
 _NOISE_RATIO_SIGMAS = 4.0
 #: Ratio of uncertainties (`Calibration.poorly_observable`) above which a parameter is poorly observable.
 _MAX_UNCERTAINTY_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7) in the tip's
-#: frame. L is `ParametricChain.characteristic_length` (m).
+#: If the tool is fitted without poses, the target is assumed at (L/5, L/6, L/7) in the tip's frame.
+#: L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
 _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
@@ -99,9 +98,8 @@ class Calibration:
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to a ratio of two uncertainties.
-            The uncertainty at the measured configurations is divided by the uncertainty at equally many
-            random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to its uncertainty at the
+            measured configurations, divided by its uncertainty at equally many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -368,10 +366,7 @@ def fit_model(
 
 
 def _values_with_assumed_target(model: CalibrationModel) -> FloatArray:
-    """Return the parameters (p,) of the original model.
-
-    If the tool is fitted, the target is at (L/5, L/6, L/7) in the tip's frame (`_ASSUMED_TARGET_DIVISORS`).
-    """
+    """Return the original parameters (p,), with the assumed target if the tool is fitted."""
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.is_base_or_tool and parameter.element == "tool" and parameter.unit == "m":
@@ -479,8 +474,7 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
 
-    Fewer parameters may be identifiable at the original values. For example, the original tip may lie on the
-    last joint's axis.
+    At the original values, fewer are identifiable, for example if the tip lies on the last joint's axis.
     """
     again = identify(
         model,
@@ -534,7 +528,7 @@ def _find_poorly_observable(
 
 
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
-    """A URDF cannot contain base, tool or gains. The comparison therefore sets base, tool and gains to 0."""
+    """Check the written model with base, tool and gains 0, because a URDF cannot contain them."""
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:
         return None
@@ -639,13 +633,10 @@ def read_poses(
     units: Mapping[str, str] | None = None,
     default_q: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Read configurations and poses.
+    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), m.
 
-    A CSV file must contain `required_coordinates`. `default_q` (nq,) contains the values of
-    coordinates without a column.
-
-    Returns:
-        Configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), m.
+    A CSV file must contain `required_coordinates`. `default_q` (nq,) contains the values of coordinates
+    without a column.
     """
     if path.suffix.lower() == ".npz":
         q, T = _read_npz_poses(path, len(coordinates))
@@ -744,11 +735,7 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
 
 
 def as_pose_array(poses: ArrayLike) -> FloatArray:
-    """Check poses or positions.
-
-    Returns:
-        (s, 4, 4) poses or (s, 3) positions.
-    """
+    """Return checked poses (s, 4, 4) or positions (s, 3)."""
     array = as_finite(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:
         return array

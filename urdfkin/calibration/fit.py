@@ -89,12 +89,11 @@ from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: The remainder of a candidate column has at least this fraction of the length of the longest remainder.
+#: Least length of a candidate's remainder, as a fraction of the longest remainder's length.
 _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
-#: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The text "same effect as ..." omits fitted parameters that contribute at most this fraction of the effect.
+#: The text "same effect as ..." omits parameters that contribute at most this fraction of the effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -124,12 +123,9 @@ def stack_jacobian(
     full_poses: bool,
     parameter_values: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the dimensionless Jacobian.
+    """Return the dimensionless Jacobian (rows, p) of all measurements.
 
     Angles and gains are multiplied by `chain.characteristic_length`.
-
-    Returns:
-        (rows, p) Jacobian of all measurements.
     """
     L = model.chain.characteristic_length
     _, columns = model.chain.poses_and_jacobian(joint_values, parameter_values)
@@ -146,13 +142,9 @@ def identify(
     full_poses: bool = True,
     parameter_values: FloatArray | None = None,
 ) -> Identification:
-    """Determine the identifiable parameters.
+    """Determine the identifiable parameters at joint values (s, n).
 
-    Args:
-        model: The model.
-        joint_values: (s, n) joint values.
-        full_poses: Whether full poses are measured.
-        parameter_values: (p,) parameter values (default: the values of the original model).
+    By default, `parameter_values` (p,) are the values of the original model.
     """
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))
@@ -212,13 +204,11 @@ def join_names(names: Iterable[str], limit: int) -> str:
 
 
 #: `Fit.has_redundancy` is true if the total redundancy is at least this number.
-#: Without rounding errors, the total redundancy is an integer.
-#: Therefore, 0.5 separates 0 from 1 in spite of rounding errors.
+#: The total redundancy is an integer plus rounding errors.
 _MIN_TOTAL_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
 #: A measurement error along an eigenvector with the eigenvalue zero does not change the residuals.
 _EIGENVALUE_CUTOFF = 1e-9
-#: Maximum number of estimates of the noise.
 _MAX_NOISE_ESTIMATES = 20
 #: The estimation ends when the relative change of the estimated noise is at most this number.
 _NOISE_CONVERGENCE = 1e-3
@@ -333,11 +323,7 @@ class Fit:
 def compute_residuals(
     model: CalibrationModel, measurements: Measurements, parameter_values: FloatArray
 ) -> FloatArray:
-    """Return residuals along the axes of the measurements' frame.
-
-    Returns:
-        (s, 3) residuals (m) of positions, or (s, 6) residuals (m and rad) of poses.
-    """
+    """Return the residuals in the measurements' frame: (s, 3) in m, or (s, 6) in m and rad."""
     return _residuals_of_poses(measurements, model.chain.poses(measurements.joint_values, parameter_values))
 
 
@@ -355,10 +341,7 @@ def fit_parameters(
     noise: Noise | None,
     parameter_values: FloatArray,
 ) -> Fit:
-    """Fit the parameters with the indices `free_parameters`.
-
-    The start values are `parameter_values` (p,).
-    """
+    """Fit the parameters with the indices `free_parameters`, starting from `parameter_values` (p,)."""
     problem = _LeastSquares(
         model,
         measurements,
@@ -384,7 +367,7 @@ def fit_parameters(
 
 
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
-    """The estimate is at least the rounding error, because an estimate of 0 would cause a division by 0."""
+    """Estimate at least the rounding error, because an estimate of 0 would cause a division by 0."""
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
     def estimate_deviation(part: slice, minimum: float, default: float) -> float:
@@ -455,12 +438,11 @@ def reject_outliers(
     fit: Fit,
 ) -> tuple[tuple[int, ...], Fit]:
     out = list[int]()
-    # `most` is the maximum number of outliers.
-    # The other poses must contain more measured numbers than the fit has parameters.
-    most = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
-    most = min(int(_MAX_OUTLIER_FRACTION * len(measurements)), most)
+    # Without the outliers, there must be more measured numbers than parameters.
+    max_outliers = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
+    max_outliers = min(int(_MAX_OUTLIER_FRACTION * len(measurements)), max_outliers)
     clean = fit
-    while len(out) < most:
+    while len(out) < max_outliers:
         inside = np.setdiff1d(np.arange(len(measurements)), out)
         worst = int(np.argmax(clean.chi_squares))
         limit = chi2_quantile(1.0 - FALSE_ALARM / len(measurements), clean.residuals.shape[1])
@@ -492,7 +474,6 @@ def select_significant(
     x, C = changes.copy(), covariance.copy()
     while (candidates := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative.
-        # `MIN_DIVISOR` replaces this variance.
         # The quotient is then very large, and the parameter counts as significant.
         sizes = np.abs(x[candidates]) / np.sqrt(np.maximum(C[candidates, candidates], MIN_DIVISOR))
         k = candidates[int(np.argmin(sizes))]
@@ -516,7 +497,6 @@ def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
 
 
 #: Maximum number of repetitions in the computation of start values for base and tool.
-#: Each repetition computes the base's rotation, then the positions of base and target.
 _MAX_START_REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
 _TARGET_CONVERGENCE = 1e-9
@@ -526,12 +506,9 @@ _MAX_SPREAD_RATIO = 100.0
 
 
 def estimate_start_values(model: CalibrationModel, measurements: Measurements) -> FloatArray:
-    """Return start values of all parameters for a fit.
+    """Return start values (p,) of all parameters.
 
     Base and tool are computed from the measured poses. The other parameters have their original values.
-
-    Returns:
-        (p,) start values.
     """
     parameter_values = model.chain.initial_values.copy()
     ends = {parameter.element for parameter in model.chain.parameters if parameter.is_base_or_tool}
@@ -581,10 +558,7 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
 
 
 def _solve_base_tool_rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve R_B^T M_i = R_i R_X for R_B and R_X.
-
-    The linear form is M_i^T R_B - R_X^T R_i^T = 0.
-    """
+    """Solve R_B^T M_i = R_i R_X, in the linear form M_i^T R_B - R_X^T R_i^T = 0, for R_B and R_X."""
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)

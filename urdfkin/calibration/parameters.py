@@ -105,10 +105,7 @@ class ParametricChain:
 
     @property
     def characteristic_length(self) -> float:
-        """Sum (m) of the model's lengths, or 1 if the sum is 0.
-
-        The product of an angle and the characteristic length is a distance.
-        """
+        """Length (m) that converts angles to distances: the sum of the model's lengths, or 1 if it is 0."""
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -118,10 +115,9 @@ class ParametricChain:
         return sum(constant) + float(sum(fitted)) or 1.0
 
     def poses(self, joint_values: FloatArray, parameter_values: FloatArray | None = None) -> FloatArray:
-        """Return the tip's poses.
+        """Return the tip's poses (s, 4, 4).
 
-        Returns:
-            (s, 4, 4) poses in the base frame; in the instrument's frame if the model has `base` parameters.
+        The poses are in the instrument's frame if the model has `base` parameters, else in the base frame.
         """
         return self.path.poses(
             self._amounts_and_derivatives(
@@ -130,11 +126,7 @@ class ParametricChain:
         )
 
     def frames(self, joint_values: FloatArray, parameter_values: FloatArray) -> FloatArray:
-        """Return the poses after each transform of the path.
-
-        Returns:
-            (s, steps, 4, 4) poses; the last pose is the tip's.
-        """
+        """Return the poses (s, steps, 4, 4) after each transform of the path; the last pose is the tip's."""
         return self.path.frames(self._amounts_and_derivatives(joint_values, parameter_values)[0])
 
     def poses_and_jacobian(
@@ -143,12 +135,9 @@ class ParametricChain:
         parameter_values: FloatArray | None = None,
         frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return tip poses, and their derivatives with respect to the parameters.
+        """Return tip poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        `frames` is the result of the method `frames`; None if it has not been computed.
-
-        Returns:
-            (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
+        `frames` is the result of the method `frames` if it has already been computed.
         """
         amounts, factors = self._amounts_and_derivatives(
             joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -177,8 +166,7 @@ class ParametricChain:
     def rounding_bound(self, joint_values: FloatArray) -> float:
         """Bound the rounding error of each number from `poses_and_jacobian`.
 
-        Returns:
-            Bound for positions (m). The bound divided by `characteristic_length` is valid for angles (rad).
+        The bound is for positions (m). For angles (rad), divide the bound by `characteristic_length`.
         """
         slides = [
             motion.joint
@@ -209,9 +197,7 @@ ORIGIN_PARAMETERS = (
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
 #: Parameters in order of preference; False: prismatic joint, True: another joint, base or tool.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
-#: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
-#: Further parameters move the joint's frame, but not its axis.
-#: The last parameter is the gain, which scales the joint's value.
+#: The order is: zero position, axis, other numbers of the joint's frame, gain.
 _ORIGIN_PREFERENCES = {
     True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
     False: ("z", "rx", "ry", "x", "y", "rz", "gain"),
@@ -243,12 +229,9 @@ class CalibrationModel:
         return self._pose_change(element, parameter_values, is_base_or_tool=True)
 
     def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
-        """Return the changed joint origins.
+        """Return the changed joint origins (4, 4) by joint name.
 
         The origin of a locked joint does not include the value at which the joint is locked.
-
-        Returns:
-            (4, 4) origins by joint name.
         """
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
@@ -355,9 +338,7 @@ class _ModelBuilder:
                 remedy="choose a path with a joint, or also fit base or tool",
             )
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # If parameters of base or tool and of a joint have the same effect, base or tool is fitted.
-        # The values of base and tool are unknown before the fit.
-        # The parameters of the joints are nearly known before the fit.
+        # Base and tool precede the joints, because only the joints are nearly known before the fit.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]
         )

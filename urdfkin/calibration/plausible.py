@@ -11,11 +11,11 @@ joint is reversed. A fit is refused for any of these reasons:
 - The orientation error, the tilt of a joint's axis, or the change of a gain is large.
 - The fit has no redundancy.
 - Joint values look like degrees.
-- The fit is suspicious, and a correction of a common mistake in the data makes the fit much more accurate.
+- The fit is inaccurate, and a correction of a common mistake in the data makes the fit much more accurate.
+- The fit changes a joint's zero by about half a turn, and the fit is plausible after such a correction.
 
-To find the mistake behind a refused or suspicious fit, the module corrects common mistakes in the data, one
-at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest
-one.
+To find the likeliest mistake, the module corrects common mistakes in the data, one at a time, and fits again.
+The first correction with a plausible fit shows the likeliest mistake.
 """
 
 from __future__ import annotations
@@ -44,41 +44,32 @@ from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, Kinem
 
 #: The rms position error of a plausible fit is at most this fraction of the reach.
 _MAX_ERROR_OF_REACH = 0.05
-#: A fit is not plausible if its rms position error exceeds both fractions.
-#: The first is a fraction of the reach.
-#: The second is a fraction of the spread: the rms distance of the measured positions from their mean.
+#: A fit is not plausible if its rms position error exceeds both fractions, of the reach and of the spread.
+#: The spread is the rms distance of the measured positions from their mean.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
 #: A fit is not plausible if its rms position error exceeds both fractions.
-#: The first is a fraction of the reach.
 #: The second is a fraction of the rms position error of a fit of base and tool alone.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _MAX_ORIENTATION_ERROR = 0.2
 #: If a fit exceeds one of these limits, the module searches for common mistakes in the data.
-#: The first limit is for the rms position error, as a fraction of the reach.
-#: The second limit is for the rms orientation error, rad.
+#: The limits are for the rms position error as a fraction of the reach, and the rms orientation error (rad).
 _SUSPECT_ERROR_OF_REACH, _SUSPECT_ORIENTATION_ERROR = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible change of a gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
-#: Two configurations with equal rounded values count as one configuration.
 _JOINT_VALUE_RESOLUTION = 1e-6
 #: This number of standard deviations is subtracted from a parameter's change before the limit is applied.
 #: Therefore, an uncertain change does not make a fit implausible.
-#: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _CHANGE_MARGIN_SIGMAS = 5.0
-#: After a correction of the data, the error of the new fit is compared with the error of the original fit.
-#: The ratio of the errors must be at most `_MAX_IMPROVED_ERROR_RATIO`.
-#: `_MAX_SIMILAR_ERROR_RATIO` is allowed if the original fit is implausible.
-#: The same ratio is allowed if the original fit changes a joint's zero by about half a turn.
+#: Largest error of a fit to corrected data, divided by the error of the original fit.
+#: The second ratio applies if the original fit is implausible, or changes a zero by about half a turn.
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
-#: Each correction of the data removes one common mistake, for example angles in degrees.
-#: The corrections are sorted by `_Trial.error_before`, the smallest first.
-#: All parameters are fitted again for the first `_MAX_FITS` corrections only.
+#: Maximum number of corrections for which all parameters are fitted.
+#: These are the corrections with the smallest `_Trial.error_before`.
 _MAX_FITS = 4
-#: A common mistake is a shift of the rows of q relative to the rows of the poses.
-#: urdfkin tries these shifts (number of rows).
-#: The number k means that row i + k of q belongs to pose i.
+#: urdfkin tries these shifts of the rows of q relative to the poses.
+#: The shift k means that row i + k of q belongs to pose i.
 _ROW_SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
 #: With too few configurations, urdfkin does not search for a correction of the data.
@@ -131,10 +122,7 @@ class FitWithData:
         return min(chain.characteristic_length, float(max(levers, distance))) or chain.characteristic_length
 
     def residual_deviation(self, reach: float) -> float:
-        """Return the residuals' standard deviation, m.
-
-        Angles are multiplied by the reach.
-        """
+        """Return the residuals' standard deviation (m); angles are multiplied by the reach."""
         return _norm(self.full_fit.residuals, reach) / math.sqrt(max(self.full_fit.total_redundancy, 1.0))
 
     def redundancy_objections(self) -> list[str]:
@@ -283,12 +271,7 @@ def _coordinates_with_limits(model: CalibrationModel) -> Iterator[tuple[str, boo
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Configurations after correcting one mistake.
-
-    Attributes:
-        first_pose: Index of the pose that belongs to the first row of `q`.
-        end_pose: Index of the pose that belongs to the last row of `q`, plus 1; None for the last pose.
-    """
+    """Configurations after correcting one mistake, for the slice first_pose:end_pose of the poses."""
 
     reason: str
     q: FloatArray
@@ -347,7 +330,7 @@ def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
 def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
     """Reverse the signs of joints one by one while the error decreases.
 
-    The result is None if the signs of fewer than two joints are reversed.
+    Return None for fewer than two reversed joints, because `_corrections` yields each single joint.
     """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
@@ -373,7 +356,6 @@ class _Trial:
         self.start = estimate_start_values(model, self.measurements)
         errors_before = _norm(compute_residuals(model, self.measurements, self.start), original.reach)
         #: Rms error (m) of the poses for the start values; rotations (rad) are multiplied by the reach.
-        #: Base and tool are computed from the poses, and the other parameters have their original values.
         self.error_before = errors_before / math.sqrt(len(self.measurements))
 
     @cached_property
@@ -405,5 +387,5 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm (m) of the residuals. Rotation residuals (rad) are multiplied by the reach (m)."""
+    """Return the norm (m) of the residuals; rotations (rad) are multiplied by the reach (m)."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))

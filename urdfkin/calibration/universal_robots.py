@@ -65,13 +65,7 @@ _DISPLACEMENT_SAMPLES = 1000
 
 
 def read_calibrated_origins(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read joint origins from a YAML file.
-
-    The file is the calibration file of the driver, or a `default_kinematics.yaml`.
-
-    Returns:
-        (4, 4) origins by joint name.
-    """
+    """Return joint origins (4, 4) by joint name, from a calibration file or a `default_kinematics.yaml`."""
     if order not in ROTATION_ORDERS:
         raise UnknownNameError("order of rotations", order, ROTATION_ORDERS)
     try:
@@ -204,12 +198,9 @@ def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) ->
 def largest_tip_displacement(
     first_origins: Mapping[str, FloatArray], second_origins: Mapping[str, FloatArray]
 ) -> tuple[float, float]:
-    """Return the largest sampled displacement between the `tool0` frames of two arms.
+    """Return the largest sampled distance (m) and angle (rad) between the `tool0` frames of two arms.
 
     The returned angle is 2 sin(angle / 2), which is accurate only for small angles.
-
-    Returns:
-        Distance, m, and angle, rad.
     """
     paths = [
         make_chain(make_calibrated_tree(origins), "tool0", "base")

@@ -69,7 +69,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """A number that is equal to `old` up to rounding keeps its digits."""
+    """Format three numbers; a number that is equal to `old` up to rounding keeps its digits."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(

@@ -115,7 +115,6 @@ def _invert_table(table: dict[str, str]) -> dict[str, str]:
 
 #: Suggested commands for words that are not commands.
 #: For example, urdfkin suggests `placement` for the word "fk".
-#: The dictionary below maps each suggested command to its words.
 _SYNONYMS = _invert_table(
     {
         "--help": "help usage man",

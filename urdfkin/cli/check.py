@@ -65,8 +65,7 @@ class CheckOutcome:
     Attributes:
         silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
             comment.
-        excerpts: Excerpt of the file for each finding; None if the finding marks no text. An excerpt has the
-            faulty line, and a line with carets below the fault.
+        excerpts: The faulty line, and a line with carets, of each finding; None if the finding marks no text.
         known_count: Number of findings that the baseline file suppresses.
         obsolete_count: Number of findings in the baseline file that the checked files no longer have.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
@@ -475,8 +474,8 @@ class CheckRun:
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
         """Return whether a file and its included files are the same as in `commit_files`.
 
-        The method assumes that the file includes every file of the commit with a suffix in `suffixes`. Return
-        False if the checked file contains the name of a file that was deleted after the commit.
+        Every file of the commit with a suffix in `suffixes` counts as included. A file that contains the name
+        of a deleted file counts as changed.
         """
         if suffixes not in self._has_changes:
             self._has_changes[suffixes] = commit_files.has_changes(suffixes)

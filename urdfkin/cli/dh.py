@@ -206,9 +206,9 @@ def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     An option that affects the rows, such as --tip or --snap, makes the command derive a new table. See
     `urdfkin explain urdf-to-dh`.
 
-    Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, the compared table differs, or its
-    fitted base, tool and joint offsets hide a mistake. 2: bad input. 3: not checked, or the rounding error of
-    a strict table is larger than that of the robot.
+    Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, or the compared table differs or
+    contains a likely mistake. 2: bad input. 3: not checked, or a strict table has a larger rounding error
+    than the robot.
     """
     from urdfkin.cli.dh_tables import DHRequest, make_dh_answer
     from urdfkin.dh.parse_table import is_table_file

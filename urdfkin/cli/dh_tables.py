@@ -66,9 +66,8 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `dh_arguments` contains the keyword arguments of `Robot.dh`. `unchanged_table` is the path of ROBOT
-    if this file contains a table or screws, and no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given.
-    Otherwise, it is None.
+    `unchanged_table` is the path of a table or screws if no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is
+    given, else None. `dh_arguments` are arguments of `Robot.dh`.
     """
 
     robot: Robot

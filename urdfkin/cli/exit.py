@@ -30,9 +30,8 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, default: int) -> int:
-        """Return the exit code of a command that a signal may have stopped.
+        """Return 128 + n after signal n, as in shells; without a signal, return `default`.
 
-        After signal n, the exit code is 128 + n, as in shells. Without a signal, the exit code is `default`.
         A signal does not change the exit code 1, which reports a disagreement.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
@@ -45,9 +44,7 @@ def handle_signals() -> Iterator[Stop]:
     Later signals are ignored, so that finished results are saved.
     """
     stop = Stop()
-    # `nohup` makes a process ignore SIGHUP.
-    # Under nohup, SIGHUP must stay ignored.
-    # urdfkin therefore replaces only default handlers.
+    # Only default handlers are replaced, so that SIGHUP stays ignored under `nohup`.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:

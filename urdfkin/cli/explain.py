@@ -21,10 +21,7 @@ _CODE_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return the sections of docs/questions.md, by the anchor of each section's heading.
-
-    Each link in a section is replaced by the text of the link.
-    """
+    """Return the sections of docs/questions.md, by the anchor of each heading; links become plain text."""
     return {
         make_anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip()
         for text in _question_sections()[1:]
@@ -32,11 +29,9 @@ def answers() -> dict[str, str]:
 
 
 def find_answer(topic: str) -> str | None:
-    """Return the section of docs/questions.md about a topic.
+    """Return a section of docs/questions.md, or None.
 
-    The function first searches for the section with the anchor `topic`. If there is none, the
-    function searches for anchors with all words of `topic`. If this second search does not find exactly one
-    anchor, the result is None.
+    The section has the anchor `topic`. Otherwise, its anchor is the only one with all words of `topic`.
     """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]

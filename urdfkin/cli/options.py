@@ -66,7 +66,7 @@ def format_from_suffix(
 
     `parameter` is the name of the option's value in `context.params`. `formats` lists the formats of each
     suffix, for example `{".py": ("numpy", "sympy")}`. The first format is the default. Raise InputError if
-    the option contradicts the suffix. Without the option, an unknown suffix is an InputError too.
+    the option contradicts the suffix, or if the suffix is unknown and the option is not given.
     """
     format_: str = context.params[parameter] or default_format
     if output is None:
@@ -109,7 +109,6 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
 #: Number of samples that an option with the value `random` draws, for example `--q random`.
-#: With the value `random:N`, the option draws N samples.
 _RANDOM_SAMPLES = 1
 
 
@@ -455,8 +454,8 @@ def read_inputs(
 ) -> Inputs:
     """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    A single sample of q, v or a is repeated for all samples of the other arrays. `option` is the option that
-    gives q. If `option` is not --q, the caller must reject an unused --seed.
+    A single sample of q, v or a is repeated for all samples of the other arrays. If `option`, the option for
+    q, is not --q, the caller must reject an unused --seed.
     """
     import numpy as np
 

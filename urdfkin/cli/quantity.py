@@ -282,8 +282,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
-    For a Hessian, each row contains the derivative of one Jacobian column by one joint coordinate.
-    Rows of a Hessian that contain only rounding errors are left out.
+    For a Hessian, each row contains the derivative of one Jacobian column by one joint coordinate. Rows with
+    only rounding errors are left out.
     """
     import numpy as np
 
@@ -399,10 +399,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
 
 
 def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> FloatArray:
-    """Convert each pose to a position with three angles (six numbers) or a quaternion (seven numbers).
-
-    If `verify` is true and all earlier results are verified, Pinocchio checks the angles or quaternions.
-    """
+    """Convert each pose to a position with three angles (six numbers) or a quaternion (seven numbers)."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of

@@ -51,10 +51,7 @@ report_options = combine(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write a report in the requested formats, and return an exit code.
-
-    The exit code is that of the first write error, or 0 if all files are written.
-    """
+    """Write a report in the requested formats, and return the exit code of the first write error, or 0."""
     codes = [
         _write(document, name, path) for name in REPORT_FILE_OPTIONS if (path := files[name]) is not None
     ]
@@ -115,7 +112,7 @@ class _ReportGroup(click.Group):
 def report_command() -> None:
     """Show, convert or compare the results of earlier validations.
 
-    Results are the JSON file of `urdfkin validate --json FILE`, or the folder of `--store DIR`. `urdfkin
+    RESULTS is the JSON file from `urdfkin validate --json FILE`, or the folder from `--store DIR`. `urdfkin
     report RESULTS` is short for `urdfkin report show RESULTS`.
     """
 
@@ -128,7 +125,7 @@ def report_command() -> None:
 def show_report(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
     """Show a report, or convert it to HTML, JUnit or Markdown.
 
-    The argument is the JSON file of `urdfkin validate --json FILE`, or the folder DIR of `--store DIR`. The
+    RESULTS is the JSON file from `urdfkin validate --json FILE`, or the folder from `--store DIR`. The
     validation may still be running; a validation with missing robots is shown as interrupted.
 
     The command ends with the exit code of the validation. 0: everything verified. 1: a disagreement. 2: a
@@ -138,7 +135,10 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
     from urdfkin.validation.document import outcome_of
 
     if results is None:
-        raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
+        raise click.UsageError(
+            "RESULTS is missing: give the JSON file that `urdfkin validate --json` wrote, or the folder of"
+            " `--store`"
+        )
     if any(files.values()):
         reject_unused_options(context, ("cases",), "if the report is written to a file")
     document = read_stored_document(results) if is_folder(results) else read_document(results)

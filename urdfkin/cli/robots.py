@@ -173,7 +173,7 @@ def _orders(robot: Robot) -> Answer:
 def _index_cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return the indices of each joint as text, for example "7", "7-13", or "-" for none.
 
-    "7/6" means index 7 in q and index 6 in v. A text without "/" applies to both q and v.
+    "7/6" means index 7 in q and index 6 in v.
     """
     indices = conversion.q_and_v_indices
 

@@ -23,8 +23,7 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Pattern of the names that completion offers.
-#: These names contain no character that a shell interprets.
+#: Completion offers only these names, because they contain no character that a shell interprets.
 #: The pattern also excludes colons, because Bash separates words at colons.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
@@ -123,9 +122,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 def warm_command() -> None:
     """Compile all kernels (machine code) and store them, for container images and CI.
 
-    Without this command, urdfkin compiles a kernel only if computations take too long, for example large
-    batches. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME. On another
-    processor, the kernels are compiled again.
+    Without this command, urdfkin computes in plain Python at first. urdfkin compiles a kernel if plain Python
+    takes more than a second, for example for large batches. Each compilation takes some seconds. Kernels are
+    stored below XDG_CACHE_HOME. On another processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """

@@ -43,10 +43,7 @@ def flush_output() -> None:
 
 
 class _RawStream(io.FileIO):
-    """A standard stream that handles write errors.
-
-    The first write error on stdout ends the command. Write errors on stderr are ignored.
-    """
+    """A standard stream; the first write error on stdout ends the command, errors on stderr are ignored."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)
@@ -71,7 +68,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _report_write_errors(stream: Any, descriptor: int) -> Any:
-    """Wrap a standard stream, so that it reports write errors. Other streams are returned unchanged."""
+    """Wrap a standard stream, so that it reports write errors; return other streams unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -92,8 +89,7 @@ def _open_closed_streams() -> None:
 
     Otherwise, the next opened file would get the stream's descriptor.
 
-    Standard input is opened write-only, so that reading fails, as on a closed stream. Standard output is
-    opened read-only, so that writing fails. Text for standard error is lost.
+    Standard input is opened write-only and standard output read-only, so that their use fails.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -126,8 +122,7 @@ class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
     With `styled`, the stream does not escape the escape sequences for colours. The caller must therefore
-    escape control characters in names. `encoding` is the encoding that this stream reports. Bytes can be
-    written to the attribute `buffer`, without escapes.
+    escape control characters in names. The attribute `buffer` accepts bytes, without escapes.
     """
 
     def __init__(self, stream: TextIO, *, styled: bool = False, encoding: str | None = None) -> None:

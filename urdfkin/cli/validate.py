@@ -53,9 +53,8 @@ def study_all(
 ) -> ValidationReport:
     """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
-    `given` are the validated robots, and `report` is their validation report. `how` are arguments of `load`.
-    `shard` is a part of the validation, for example "1/4". A part studies only the robots with their first
-    sample in this part. An interrupt skips the remaining robots.
+    `how` are arguments of `load`. With `shard`, for example "1/4", only the robots with their first sample in
+    this part of the validation are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -87,10 +86,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyStore | None]:
-    """Lock the store in `folder`, and yield the accuracy results in the store.
-
-    With `shard`, only the results of the given part are locked.
-    """
+    """Lock the store, or its part `shard`, and yield the accuracy results in the store."""
     if folder is None:
         yield None
         return

@@ -188,10 +188,7 @@ def _find_quantity(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return the functions to verify, by name.
-
-    The target FILE.py selects all functions of the file that are named after a quantity.
-    """
+    """Return the function of FILE.py:FUNCTION, or all functions of FILE.py named after a quantity."""
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(

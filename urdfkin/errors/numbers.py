@@ -11,7 +11,6 @@ import math
 import re
 from typing import NamedTuple
 
-#: Pattern of a decimal number.
 #: The matching time is linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")
@@ -60,7 +59,6 @@ def number_remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Short name of the unit for each accepted name.
 UNIT_SHORT_NAMES = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

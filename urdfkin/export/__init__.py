@@ -28,7 +28,6 @@ LANGUAGES: dict[str, tuple[str, str]] = {
 }
 #: Values of the argument `form` of `Robot.export`.
 FORMS = ("tree", "dh", "screws")
-#: Quantities that are exported by default.
 DEFAULT_QUANTITIES = ("placement", "jacobian", "acceleration")
 
 

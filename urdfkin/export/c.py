@@ -144,10 +144,7 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def min_configuration_count(code: FrameCode, function: Function) -> int:
-    """Return the least number of configurations for which every array has at least eight numbers.
-
-    Empty arrays are ignored.
-    """
+    """Return the least number of configurations with at least eight numbers in every non-empty array."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
@@ -256,10 +253,7 @@ def _wrap_numbers(values: Sequence[str]) -> str:
 
 
 def main_program(code: FrameCode, *templates: str) -> str:
-    """Return a program with test vectors.
-
-    `templates` are names such as "check_one.c".
-    """
+    """Return a program that checks the test vectors with templates such as "check_one.c"."""
     checks = (_check(code, function, template) for function in code.functions for template in templates)
     return fill_template("check.c", checks="".join(checks))
 

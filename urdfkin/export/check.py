@@ -1,7 +1,7 @@
-"""Check the test vectors of an exported file, and the digest in its header (the seal).
+"""Run the test vectors of an exported file, and check that the file is unchanged.
 
-The seal is a line in the header with the digest of the file's text. The seal shows whether the header, the
-code or the test vectors were changed. A seal is not a signature, so it does not prove who wrote the file.
+The line "Seal" in the header contains a checksum of the file's text. The checksum does not prove who wrote
+the file.
 
 The check runs the file as code. Check a file from another person only if you would run that person's
 programs. The check runs a copy of the file in a separate folder. In the original folder, the file could
@@ -43,8 +43,7 @@ _COMPILE_COMMANDS = {
 }
 #: Compiler and options for CUDA if the computer has nvcc and a GPU.
 _GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: The check looks for `EXPORT_MARK` and the word UNVERIFIED in this number of characters at the start of a
-#: file.
+#: Number of characters at the start of a file that contain `EXPORT_MARK` and the word UNVERIFIED.
 _HEADER_LENGTH = 2000
 #: Time limit (s) of a compiler or a test program.
 #: The code of a robot with a thousand joints compiles in one minute.

@@ -167,8 +167,7 @@ def _processor_features() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results of one configuration.
-#: With this limit, eight configurations need at most half a megabyte of stack.
+#: With this number of results each, eight configurations need half a megabyte of stack.
 _MAX_RESULTS = 8192
 # Plain integers are faster than members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(

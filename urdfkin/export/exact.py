@@ -122,11 +122,7 @@ def make_exact_plan(
 
 
 def _rotation_with_z_axis(axis: Vector, z: float) -> Matrix:
-    """Return a rotation matrix with third column `axis`.
-
-    See `rotation_with_z_axis`. `axis` is a unit vector of exact numbers. `z` is the third component of `axis`
-    as a float.
-    """
+    """Compute `rotation_with_z_axis` for an exact unit vector; z is its third component as a float."""
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
     scale = -1 / (sign + own)

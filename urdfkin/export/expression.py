@@ -145,10 +145,7 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_equation_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Wrap an equation, so that each new node stores the equation's number.
-
-        If an equation calls another equation, all nodes store the number of the calling equation.
-        """
+        """Wrap an equation, so that each new node stores the number of the outermost equation."""
         found = _EQUATION_NUMBERS.match(equation.__doc__ or "")
         if found is None:
             return equation
@@ -172,7 +169,7 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return y if x is an expression -y or a negative constant -y; otherwise, return None."""
+    """Return -x if x is a negation or a negative constant, otherwise None."""
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None

@@ -13,8 +13,8 @@ All other expressions are parts of larger expressions.
 constant of the code has the value x_i with the rounding error e_i (`urdfkin.kinematics.roundings`). A result
 y has this error and this bound:
 
-`error = sum of e_i dy/dx_i`
-`bound = sum of |e_i dy/dx_i|`
+    error = sum of e_i dy/dx_i
+    bound = sum of |e_i dy/dx_i|
 
 A backward pass over the operations computes the derivatives.
 """
@@ -45,7 +45,6 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
 INPUT_LETTERS = ("q", "v", "a")
-#: The results of these operations are always assigned to variables.
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement of exported code.
 _MAX_STATEMENT_OPERATIONS = 12
@@ -121,10 +120,7 @@ class Function:
         return set(find_dependencies(self.results, leaves))
 
     def node_values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
-        """Return each expression's values (n,).
-
-        `inputs` are q (n, nq), v and a (n, nv).
-        """
+        """Return each expression's values (n,) for q (n, nq), v and a (n, nv)."""
         value: dict[Node, Any] = {}
         arrays = dict(zip(INPUT_LETTERS, inputs, strict=False))
         for node in self.nodes:
@@ -137,10 +133,7 @@ class Function:
         return value
 
     def evaluate(self, inputs: Sequence[FloatArray]) -> FloatArray:
-        """Evaluate the results (n, ...).
-
-        `inputs` are q (n, nq), v and a (n, nv).
-        """
+        """Return the results (n, ...) for q (n, nq), v and a (n, nv)."""
         value = self.node_values(inputs)
         out = np.empty((len(inputs[0]), len(self.results)))
         for k, x in enumerate(self.results):
@@ -172,10 +165,7 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 
 
 def _strip_minus(node: Node) -> Node:
-    """Return x for the expression -x.
-
-    Exported code stores x in a variable, and negates x at each use.
-    """
+    """Return x for -x, because exported code stores x and negates it at each use."""
     return node.operands[0] if node.op == "neg" else node
 
 
@@ -240,10 +230,7 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives of the results with respect to x.
-
-        If x is a constant, add the absolute value of `slope` times the error of x to the bounds.
-        """
+        """Add `slope` to the derivatives with respect to x, or add a constant's error to the bounds."""
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
         elif x in slopes:

@@ -28,8 +28,7 @@ class Dialect:
     Attributes:
         result: Generator of the code lines that return the results.
         imports: Import lines. The names of the used functions replace `{}`, for example `cos, sin`.
-        values_body: Body of the exported function `_values`.
-            `_values` evaluates a function at several configurations.
+        values_body: Body of the exported function `_values`, which evaluates several configurations.
         input_format: Pattern of the code for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported `check`.
     """
@@ -54,8 +53,6 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `result` function, which makes code that fills an array."""
-
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
         yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
@@ -67,10 +64,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a `result` function, which makes code that returns a matrix.
-
-    A Hessian becomes a matrix (6 nv, nv).
-    """
+    """Return a `result` function; a Hessian becomes a matrix (6 nv, nv)."""
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -115,8 +109,6 @@ def _input_check_lines(writer: Writer, namespace: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Return a `first_lines` function, which makes code that checks the inputs' lengths."""
-
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
         for x, width in writer.code.widths(writer.function).items():
@@ -133,10 +125,7 @@ def _array_first_lines(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `result` function, which makes code that stacks numbers.
-
-    The code does not fill an array, because some libraries have immutable arrays, for example JAX.
-    """
+    """Return a `result` function; the code fills no array, because JAX's arrays are immutable."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -186,11 +175,9 @@ def _make_input_check(
     array: str = "an array",
     is_array: str = "",
 ) -> str:
-    """Return code of the function `_demand`.
+    """Return code of the function `_demand`, which checks an input `x`.
 
-    `wrong_type` and `is_array` are Python expressions about the input `x`. `wrong_type` is true if the
-    numbers in `x` have a wrong type. `is_array` is true if `x` is an array. If `is_array` is empty, `_demand`
-    does not test whether `x` is an array. `parameters` contains further parameters of `_demand`.
+    `wrong_type` and `is_array` are Python conditions on `x`. An empty `is_array` omits the test for an array.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _INPUT_CHECK.format(

@@ -177,8 +177,7 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the Hessian (6, nv, nv) row by row.
 
-    For each joint motion i, the Hessian contains the derivative H_i (6, nv) of the Jacobian with respect to
-    the motion. The time derivative of the Jacobian is the sum of H_i v_i (7.126).
+    The product of the Hessian and v is the time derivative of the Jacobian (7.126).
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)

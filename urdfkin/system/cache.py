@@ -29,8 +29,7 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_if_exists
 
-#: Version of the checksum.
-#: The digest in a folder's name depends on the checksum's version.
+#: The digest in a folder's name depends on this version.
 _CHECKSUM_VERSION = "sealed with its name"
 _MAX_UNUSED_SECONDS = 30 * 24 * 3600.0
 #: `make_cache_folder` updates the modification time of this file. Unused folders are deleted later.
@@ -86,8 +85,7 @@ _warned_messages: set[str] = set()
 def _unsafe_reason(folder: Path) -> str | None:
     """Return the reason why another user could have written to a folder, or None.
 
-    The function also checks the parent folders. Every user who can write to a parent folder can replace
-    `folder`, unless the parent folder has the sticky bit.
+    A user who can write to a parent folder without the sticky bit can replace `folder`.
     """
     me = os.geteuid()
     for path in (folder, *folder.parents):
@@ -103,10 +101,7 @@ def _unsafe_reason(folder: Path) -> str | None:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group has the user's name and no other member.
-
-    Many systems create a private group for each user.
-    """
+    """Return whether a group is the private group that many systems create for each user."""
     try:
         name, entry = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:

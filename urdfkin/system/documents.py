@@ -149,9 +149,9 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Find an entry of `data` that is missing in `document`, the conversion of `data`.
+    """Return the JSON path of an unknown entry, and a message.
 
-    Return the JSON path of the mapping with the entry, and a message. Return None if there is no such entry.
+    `document` is the conversion of `data`, which omits unknown entries.
     """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:

@@ -38,8 +38,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # Another thread can register `_before_fork` during this fork. Then `_acquired_locks` has no entry for the
-    # forking thread.
+    # If another thread registers `_before_fork` during this fork, `_acquired_locks` lacks this thread.
     for lock in reversed(_acquired_locks.pop(threading.get_ident(), [])):
         lock.release()
 
@@ -61,8 +60,8 @@ class ImportLock:
         _locks.append(self._lock)
 
     def register_fork_handlers(self) -> None:
-        # Waiting for the lock here could cause a deadlock: the thread that holds the lock may wait for the
-        # import of the calling module.
+        # Waiting here could cause a deadlock.
+        # The thread that holds the lock may wait for the import of the calling module.
         if self._registered:
             return
         with self._lock:

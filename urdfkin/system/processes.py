@@ -44,10 +44,7 @@ def _import_path() -> list[str]:
 
 
 def _is_dask_folder(entry: str) -> bool:
-    """Return whether an entry of `sys.path` is in Dask's temporary folder.
-
-    Other users can write to this folder.
-    """
+    """Return whether an entry of `sys.path` is in Dask's temporary folder, which other users can change."""
     return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 
