@@ -114,7 +114,7 @@ class AccelerationBreakdown(Displayable):
 
 
 class _RelativeMotion(NamedTuple):
-    """Velocity or acceleration of a joint relative to its parent link; (n, 3) arrays in world axes."""
+    """A joint's velocity or acceleration relative to its parent link, (n, 3) each, in world axes."""
 
     linear: FloatArray
     angular: FloatArray
@@ -215,7 +215,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return the joint's translation (n, 3) in the joint's axes; 0 for a revolute joint."""
+    """Return the joint's translation (n, 3) in the joint's axes."""
     translation = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
@@ -265,10 +265,7 @@ def _relative_motion(joint: Joint, x: FloatArray, R: FloatArray) -> _RelativeMot
 
 
 def _base_acceleration(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point fixed to the base (7.123).
-
-    `d` is the vector from the base's origin to the point.
-    """
+    """Return the acceleration of a point fixed to the base, at `d` from the base's origin (7.123)."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
