@@ -331,8 +331,7 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
 
 #: Above this batch size, the time of PyTorch Kinematics per configuration grows.
 _MAX_BATCH = 20_000
-#: Tolerance for PyTorch Kinematics.
-#: PyTorch Kinematics reads the angles of a URDF in single precision.
+#: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _SINGLE_TOLERANCE = 1e-6
 
 

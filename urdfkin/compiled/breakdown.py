@@ -6,7 +6,9 @@
 | w_{k-1} | angular velocity of link k-1 |
 | d | vector from the joint's origin to the frame's origin |
 
-For `Reference.WORLD`, the world's origin replaces the frame's origin in u_k and d.
+For `Reference.WORLD`, the world's origin replaces the frame's origin in u_k and d. For the other reference
+frames, d is the sum of the interorigin vectors after the joint (7.110). A difference of two positions in the
+world would lose digits if the robot is far from the world's origin or has a long link.
 
     u_k = v_k z x d    for a revolute joint
     u_k = v_k z        for a prismatic joint
@@ -20,10 +22,6 @@ sum of these terms over all joints:
 | centripetal | v_k z x (v_k z x d) | velocity of a revolute joint |
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
-
-For the other reference frames, d is the sum of the interorigin vectors after the joint (7.110). A difference
-of two positions in the world would lose digits if the robot is far from the world's origin or has a long
-link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
 planar or floating joint has an additional Coriolis term, because the joint's axes of translation rotate. The
