@@ -6,8 +6,8 @@ The script also moves through the page with the Tab key, checks the HTML, and pr
 `--output` saves pictures of all screens and of the printed pages.
 
 The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. Three tools are
-optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils. The tool poppler-utils
-converts the pages of the PDF to pictures.
+optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils, which converts the pages
+of the PDF to pictures.
 
     npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
     python -m scripts.audit_pages --output /tmp/audit

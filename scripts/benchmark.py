@@ -2,10 +2,10 @@
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
-Each round times every library once. Ratios are therefore reliable even on a machine with other load, but
-absolute times are not. The script prints medians, minima and ratios of medians. The script first compares the
-results of all libraries, and fails if they differ. A slow library does not cause a failure. A library that is
-not installed is listed, but not measured.
+The script first compares the results of all libraries, and fails if they differ. Each round then times every
+library once. Ratios are therefore reliable even on a machine with other load, but absolute times are not. The
+script prints medians, minima and ratios of medians. A library that is not installed is listed, but not
+measured.
 
 `--only where` measures the time of each step of a batch and of a single call. `--only first` measures the
 first call of each quantity, in a new process.
@@ -39,15 +39,15 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 @dataclass(frozen=True)
 class BenchmarkSize:
-    configurations: int = 100_000  # number of configurations of a batch
-    rounds: int = 21  # number of rounds of each table
+    configurations: int = 100_000  # configurations of a batch
+    rounds: int = 21
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # elements of all Jacobians of a batch, approximately
+    numbers: int = 4_000_000  # approximate number of elements of a batch's Jacobians (section `joints`)
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames in one pass
     frame_configurations: int = 4_000  # configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
-    memory: int = 1_000_000  # number of configurations for the measurement of memory
+    memory: int = 1_000_000  # configurations for the measurement of memory
 
 
 QUICK = BenchmarkSize(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)

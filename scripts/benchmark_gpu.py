@@ -4,8 +4,8 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. A data rate counts the bytes that a program reads and writes per second. The last
-column is the data rate of the code, divided by the data rate of a copy within the GPU's memory.
+median of several launches. The last column is the code's data rate (bytes read and written per second),
+divided by the data rate of a copy within the GPU's memory.
 
 If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
 `torch.compile`. If PyTorch Kinematics is installed too, the program also measures the Jacobian of PyTorch
@@ -44,13 +44,12 @@ from urdfkin.export.forms import make_robot_code
 from urdfkin.export.function import Function
 from urdfkin.robot import Robot
 
-#: Batch sizes: the number of configurations in each batch.
+#: Numbers of configurations in a batch.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
 #: Number of timed launches per measurement.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
-#: Maximum allowed error of the Jacobian from PyTorch Kinematics.
-#: PyTorch Kinematics reads the angles of a URDF in single precision.
+#: Maximum allowed error of PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"

@@ -34,10 +34,7 @@ def _run(*command: str | Path, **environment: str) -> None:
 
 
 def _commit_time() -> str:
-    """Return the time of the last commit (s).
-
-    Outside a repository, return 1980-01-01.
-    """
+    """Return the time of the last commit (s); 1980-01-01 outside a repository."""
     command = ["git", "log", "-1", "--format=%ct"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "315532800"

@@ -20,7 +20,7 @@ _NO_CHANGELOG = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
 class NoBaseError(Exception):
-    """HEAD cannot be compared with main."""
+    """HEAD has no base to compare with."""
 
 
 def run_git(root: Path, *words: str) -> str:

@@ -10,9 +10,9 @@ multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests 
 results differ from the stored results, the script prints the largest difference as a fraction of the stored
 bound.
 
-Exit 1: calls with the same inputs return different bits, or a result differs from the stored result. With
-the option `--within 0.1`, a difference from the stored result is allowed up to 0.1 times the result's error
-bound.
+Exit 1: a result is not finite, calls with the same inputs return different bits, or a result differs from the
+stored result. With the option `--within 0.1`, a difference from the stored result is allowed up to 0.1 times
+the result's error bound.
 """
 
 import argparse
@@ -99,7 +99,7 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 
 
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
-    """Yield a message for each difference of batches, prepared frames and single calls."""
+    """Yield a message for each difference from a single call, and for results that are not finite."""
     frame = subject.frames[0]
     for call_name, quantity, reference, inputs in subject.calls():
         stored_inputs = [x[:STORED] for x in inputs]

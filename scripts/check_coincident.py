@@ -4,10 +4,10 @@
     python scripts/check_coincident.py --arms 60      # the first 60 arms
 
 Half of an arm's axes are at most 1 mm and 1e-3 rad from the previous axis (`nearly_coincident` in
-`tests/dh/test_compare.py`). For each arm, the script makes a standard and a modified table. These tables have
-other signs and zeros than the arm, and no base and tool. For the first 400 arms, the script also makes a
-strict table. Each table must agree with its arm. For the first 400 arms, the script also counts the verdicts
-of `urdfkin same` for the arm and its standard table.
+`tests/dh/test_compare.py`). For each arm, the script makes a standard and a modified table. For the first 400
+arms, the script also makes a strict table. All tables have other signs and zeros than the arm, and no base
+and tool. Each table must agree with its arm. For the first 400 arms, the script also counts the verdicts of
+`urdfkin same` for the arm and its standard table.
 
 Exit 1: a table differs from its arm.
 """
@@ -30,7 +30,7 @@ MAX_STRICT = MAX_SAME = 400
 
 
 def compare_arm(seed: int) -> Iterator[TableComparison]:
-    """Compare the standard table and the modified table of an arm with the arm."""
+    """Compare an arm's standard and modified table with the arm."""
     tree = nearly_coincident(seed)
     table = disguised(make_dh_table(tree, "tip"), seed)
     for convention in CONVENTIONS:
@@ -38,7 +38,6 @@ def compare_arm(seed: int) -> Iterator[TableComparison]:
 
 
 def compare_strict(seed: int) -> TableComparison:
-    """Compare a strict table of an arm with the arm."""
     tree = nearly_coincident(seed)
     table = make_dh_table(tree, "tip", near_parallel="strict")
     return compare(make_chain(tree, "tip"), disguised(table, seed))

@@ -51,8 +51,7 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: For robots with more joint velocities, the formats `torch` and `jax` are checked without Hessian.
-#: The check of the Hessian would be slow.
+#: For robots with more joint velocities, the slow check of the Hessian is skipped for `torch` and `jax`.
 #: For JAX, the format `array` is always checked without Hessian, because JAX would compile it for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
@@ -63,10 +62,7 @@ def make_code(robot: Robot, frame: str, quantities: Sequence[str] = DEFAULT_QUAN
 
 
 def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Yield each program's name and largest error ratio.
-
-    An error ratio is an error divided by the error's bound.
-    """
+    """Yield each program's name and largest ratio of an error to its bound."""
     for to, suffix, compilers, strict in _COMPILED:
         source, name = folder / f"robot{suffix}", code.name.upper()
         for compiler in filter(shutil.which, compilers if to in languages else ()):
@@ -97,7 +93,7 @@ def _largest_ratio(found: Sequence[float], count: int) -> float:
 
 
 def leaf_frames(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Yield the tip frames, then the other leaves."""
+    """Yield the tip frames, then the other leaves in random order."""
     robots = {name: urdfkin.load(name) for name in example_robot_data_names()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame

@@ -44,8 +44,7 @@ from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
-#: Octave's symbolic package takes 20 s for six joints.
-#: The format `matlab-symbolic` is checked for at most 6 tables of at most 4 rows.
+#: Limits for the format `matlab-symbolic`, because Octave's symbolic package takes 20 s for six joints.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the Octave program, for each format.
@@ -77,8 +76,7 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: A function that runs the code of jobs, and returns one array of poses for each job.
-#: The function may write files into the given folder.
+#: A function that runs the code of jobs and returns the poses of each job. It may write into the folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -174,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return the width (points) by which each table is wider than the text; 0 if the table fits."""
+    """Return each table's excess over the width of the text (points); 0 if the table fits."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -198,15 +196,11 @@ def _find_program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A Denavit-Hartenberg table with poses from Pinocchio.
-
-    Attributes:
-        pinocchio_poses: Tip poses relative to the table's base.
-    """
+    """A Denavit-Hartenberg table with poses from Pinocchio."""
 
     name: str
     job: Job
-    pinocchio_poses: FloatArray
+    pinocchio_poses: FloatArray  # tip poses relative to the table's base
 
     @property
     def table(self) -> DHTable:

@@ -7,10 +7,8 @@ If the cost grows linearly, all numbers in a row are equal. Each document is che
 a check that takes longer than `--patience`, the script skips the larger documents with the same kind of
 content.
 
-For each kind of content, a function returns a URDF that repeats this content. The URDF has approximately the
-size (bytes) that the script passes to the function. Files from a faulty exporter or an attacker may have as
-many repetitions. Even if urdfkin rejects the file, the time and memory of the check must be proportional to
-the file's size.
+Each document repeats one kind of content, as a file from a faulty exporter or an attacker may do. Even if
+urdfkin rejects the file, the time and memory of the check must be proportional to the file's size.
 """
 
 import argparse
@@ -38,7 +36,6 @@ def _robot(inside: str) -> bytes:
 
 
 def _repeat(size: int, piece: str) -> str:
-    """Repeat a piece of XML, and number the copies."""
     count = max(size // len(piece.format(i=10**6)), 2)
     return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
@@ -164,10 +161,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return the processor time (s) and the memory (MB), both per MB of the document.
-
-    The memory includes the findings.
-    """
+    """Return the processor time (s) and the memory with the findings (MB), both per MB of the document."""
 
     def read_usage() -> tuple[float, float]:
         return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
@@ -196,7 +190,7 @@ if __name__ == "__main__":
         print(measure_cost(options.words[0], options.one))
         sys.exit()
     sizes = [float(size) for size in options.sizes.split(",")]
-    heads = ["time (s) and memory (MB) per megabyte of", *(f"{size:g} MB" for size in sizes)]
+    heads = ["time and memory per MB, by content and file size", *(f"{size:g} MB" for size in sizes)]
     print(table(heads, [], left=1))
     for kind in (kind for kind in KINDS if not options.words or any(word in kind for word in options.words)):
         cells: list[str] = []

@@ -10,9 +10,9 @@ For the other ten changes, `same` must find that robot and copy differ. The chan
 rounding to four digits leaves some robots unchanged, so every verdict is accepted.
 
 For these ten changes, `same` also returns an interval for the largest distance between matching frames of
-robot and copy. The script checks this interval. An independent global search maximizes the distance. The
-script computes the distance with fifty digits from the decimal numbers in the two URDF texts. The distance
-must lie in the interval. The script skips an infinite interval, and a copy whose base `same` moves.
+robot and copy. An independent global search maximizes the distance, which is computed with fifty digits from
+the decimal numbers in the two URDF texts. The result must lie in the interval. The script skips an infinite
+interval, and a copy whose base `same` moves.
 
 Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
@@ -37,8 +37,7 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of each element of a placement.
-#: Elements are coordinates (m) and entries of the rotation matrix.
+#: Maximum rounding error of each element of a placement: a coordinate (m) or an entry of the rotation.
 ROUNDING = 1e-10
 
 
@@ -53,7 +52,7 @@ def check_pair(name: str, change: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": change, "verdict": comparison.verdict.value, "seconds": seconds}
     if change in ALIKE:
         return result | {"right": bool(comparison) and moves_alike(comparison, a, b, ROUNDING)}
-    # Rounding to four digits leaves some files unchanged, so every verdict is accepted.
+    # For `rounded`, every verdict is accepted, because rounding leaves some files unchanged.
     result["right"] = comparison.verdict is Verdict.DIFFERS or change == "rounded"
     tools = {tool.b for tool in comparison.tools}
     frames = [frame for frame in comparison.frames if frame.frame_b not in tools and frame.q_a]

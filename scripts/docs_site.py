@@ -21,7 +21,7 @@ LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
 #: Maps a page to its title, its introduction, and the names that the page describes.
-#: A name without a dot is a name in the package `urdfkin` or in the class `Robot`.
+#: A name without a dot belongs to the package `urdfkin` or to the class `Robot`.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",

@@ -61,8 +61,6 @@ def make_case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that tests one case after another."""
-
     def __init__(self, work: Callable[[Connection], None], timeout: float) -> None:
         self.work, self.timeout = work, timeout
         self.process: BaseProcess | None = None
@@ -101,7 +99,6 @@ class Worker:
 
 
 def run_worker(seed: int, pipe: Connection) -> None:
-    """Evaluate each case that arrives on the pipe."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)

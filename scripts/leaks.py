@@ -48,9 +48,7 @@ def measure_usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    # `use_only` loads each kernel at its first use.
-    # Without `use_only`, urdfkin would load some kernels only after many calls.
-    # The growth of memory after these calls would look like a leak.
+    # `use_only` loads each kernel at its first use. A later load of a kernel would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

@@ -85,8 +85,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # An imported name is a module, or is defined in a module.
-        # For example, `urdfkin.robot.loading` is a module, and `urdfkin.robot.Robot` is a class.
+        # An imported name is a module (`urdfkin.robot.loading`) or is defined in one (`urdfkin.robot.Robot`).
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()
@@ -97,10 +96,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return the names that `__init__.py` imports.
-
-    An imported name can hide a submodule of the same name.
-    """
+    """Return the names that `__init__.py` imports, which can hide submodules of the same name."""
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -110,7 +106,7 @@ def _reexported(package: str) -> frozenset[str]:
 
 
 def find_forbidden_imports() -> list[str]:
-    """List imports that break the order of packages."""
+    """Return the imports that break the order of packages."""
     rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"

@@ -59,9 +59,7 @@ ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
-#: A robot that shows the order of coordinates.
-#: The link `base` is the parent of joints z and a.
-#: Joint k comes after joint z.
+#: A robot with two branches, which shows the order of coordinates.
 TREE = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),

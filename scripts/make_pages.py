@@ -237,7 +237,7 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
             # `steps` is the largest width of an interval, as a multiple of the distance between doubles.
-            # The distance is that of neighbouring doubles at the quantity's largest absolute value.
+            # The distance between doubles is taken at the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

@@ -36,7 +36,6 @@ _UNFOLD = """
 
 
 def make_report(robots: int) -> Document:
-    """Copy the results of a few robots many times."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
     few = islice(cycle(document["robots"]), robots)
     document["robots"] = [robot | {"source": f"fleet/{i:04}.urdf"} for i, robot in enumerate(few)]

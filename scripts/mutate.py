@@ -190,7 +190,7 @@ def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
     change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
     result, detail = _run_in_process(change, [named.test], timeout)
     if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
-        # The first reported problem is not a failure of `named.test`, but for example an import error.
+        # `named.test` did not fail. Another problem occurred, for example an import error.
         result = "not run"
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)

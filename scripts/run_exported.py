@@ -24,7 +24,6 @@ from typing import Any
 
 
 def error_ratios(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield each check's name and largest error ratio."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -76,7 +75,6 @@ def check_compiled(scope: dict[str, Any]) -> float:
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio; NaN counts as larger than any number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):

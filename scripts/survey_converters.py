@@ -10,15 +10,14 @@ usd-exchange contain modules with equal names:
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
 
-The script prints a table with one row for each robot. For one tool, a row shows the verdict of `same`. The
-row also shows a bound on the distance and a bound on the angle between matching frames. For several tools, a
-row has one cell for each tool. The cell shows a short verdict and the bound on the distance. The full
-verdicts are printed to standard error. For several tools, `same` uses no branch and bound. Without branch and
-bound, `same` is faster, but the bounds may be larger.
+The script prints a table with one row for each robot. For one tool, a row shows the verdict of `same` and
+two bounds (see `make_row`). For several tools, a row has one cell for each tool, with a short verdict and the
+bound on the distance. The full verdicts are then printed to standard error. `same` is then faster, because it
+uses no branch and bound, but the bounds may be larger.
 
 The script removes visuals and collisions, because a converter would search for the meshes. MuJoCo refuses a
-moving body without mass. The script therefore sets options of MuJoCo. The options give bodies without mass a
-small mass, and correct impossible inertias.
+moving body without mass. The script therefore sets options with which MuJoCo gives such bodies a small mass,
+and corrects impossible inertias.
 """
 
 import argparse
@@ -90,9 +89,7 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short forms of verdicts. A verdict that begins with a key is replaced by the value.
-#: For example, "single precision" replaces "same up to single precision".
-#: The first matching key counts.
+#: Short forms of verdicts. The first key with which a verdict begins determines its short form.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -139,10 +136,7 @@ def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sam
 
 
 def _write_without_shapes(urdf: str, folder: Path) -> Path:
-    """Write a URDF without visuals and collisions, with settings for MuJoCo.
-
-    Other tools ignore these settings.
-    """
+    """Write a URDF without visuals and collisions, with settings that only MuJoCo reads."""
     robot = ElementTree.fromstring(urdf)
     for link in robot.iterfind("link"):
         for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:

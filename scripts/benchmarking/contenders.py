@@ -69,10 +69,6 @@ class Contender:
 
 
 def urdfkin_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
-    """Yield a batch's timed tasks.
-
-    The task `FLOOR` only writes the output array.
-    """
     method, n = getattr(workload.robot, quantity), workload.n
     inputs = workload.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *workload.result_shape(quantity)))
@@ -132,7 +128,6 @@ def all_joints_calls(workload: Workload) -> Calls:
     return Calls(LOOP, names, ("compute(model, data, q)", "get(model, data, frame, aligned)"))
 
 
-#: The loop and the shared arrays of a worker process.
 _worker_state: dict[str, Any] = {}
 
 
@@ -181,16 +176,13 @@ LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
-    """Return the position in `ours` of each name in `theirs`."""
+    """Return the index in `ours` of each name in `theirs`."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
 
 def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Add columns of zeros to Jacobians.
-
-    Column k of `J` becomes column `columns[k]`.
-    """
+    """Move column k of `J` to column `columns[k]`; the other columns are 0."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
@@ -199,9 +191,7 @@ def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 def dynibo(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo.
 
-    The rows are [angular; linear].
-    The columns are in breadth-first order of the joints.
-    The elements are stored column by column.
+    dynibo stores a Jacobian column by column, with rows [angular; linear] and joints in breadth-first order.
     """
     import dynibo
 
@@ -341,8 +331,7 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
 
 #: Above this batch size, the time of PyTorch Kinematics per configuration grows.
 _MAX_BATCH = 20_000
-#: Tolerance for PyTorch Kinematics.
-#: PyTorch Kinematics reads the angles of a URDF in single precision.
+#: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _SINGLE_TOLERANCE = 1e-6
 
 

@@ -44,11 +44,9 @@ _Z = (0.0, 0.0, 1.0)
 def frame_results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
-    """Return a frame's results in world axes.
+    """Return a frame's results in world axes (7.85 and 7.127 to 7.130).
 
-    The equations are 7.85 (Jacobian) and 7.127 to 7.130 (acceleration).
-    Each joint must have one coordinate. `eq` is the module `equations`, or has the same functions for another
-    array type.
+    Each joint must have one coordinate. `eq` has the functions of `equations` for the type of the arguments.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):
@@ -87,11 +85,7 @@ def generated_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
-    """Compile the C code.
-
-    Returns:
-        The compiled function. Its arguments are the batch size and the addresses of q, v, a and `out`.
-    """
+    """Return a function of the batch size and of the addresses of q, v, a and `out`."""
     plan, folder = workload.plan, workload.folder
     is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {

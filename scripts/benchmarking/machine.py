@@ -21,12 +21,9 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the time (ms) that a process needs for its first result.
-#: `EMPTY`: the kernel cache is empty.
-#: `STORED`: the kernel cache contains all kernels.
+#: Keys of the time (ms) for a first result, with an empty kernel cache and with stored kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` that compile a kernel at their first call, with the number of inputs.
-#: The inputs are 1: q, 2: q and v, 3: q, v and a.
+#: Methods of `Robot` that compile a kernel at their first call, with the number of inputs q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,

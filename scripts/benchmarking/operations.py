@@ -33,18 +33,11 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number that records an operation instead of a value.
+    """A number that records an operation instead of a value."""
 
-    Attributes:
-        constant: 0 or 1; None for any other number.
-        operands: The two operands of the recorded operation. An input or a constant has no operands.
-    """
-
-    constant: int | None = None
-    #: True for a placeholder: urdfkin does not compute this number, because no result needs it.
-    #: Operations with a placeholder are not counted.
-    unused: bool = False
-    operands: tuple[Number, ...] = ()
+    constant: int | None = None  # 0 or 1; None for any other number
+    unused: bool = False  # True for a placeholder: operations with it are not computed and not counted
+    operands: tuple[Number, ...] = ()  # both operands of the operation; empty for an input or a constant
 
     def __add__(self, other: Number) -> Number:
         if self.unused or other.unused:
@@ -90,8 +83,6 @@ def count_shared(results: Any) -> int:
 
 @dataclass
 class _RecordedRecursion:
-    """The forward recursion, called with `Number`."""
-
     written: list[Any] = field(default_factory=list)
 
     def __post_init__(self) -> None:

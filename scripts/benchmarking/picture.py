@@ -18,7 +18,7 @@ KINDS = {
 MARKS = {"jacobian": ("o", "-"), "acceleration": ("s", "--")}
 TITLES = {"jacobian": "Jacobian", "acceleration": "acceleration"}
 
-#: The measurements of one contender, as a mapping.
+#: A `Row` as a mapping.
 Entry = Mapping[str, Any]
 
 

@@ -109,7 +109,7 @@ def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) ->
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
     """Measure chains with the given numbers of joints.
 
-    A batch of Jacobians has about `numbers` elements, and at least 16 configurations.
+    The Jacobians of a batch have about `numbers` elements in total. A batch has at least 16 configurations.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)
@@ -154,11 +154,9 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# A batch has several steps, for example the forward recursion.
-# For each k, the benchmark measures a kernel that has only the first k steps.
+# For a batch, the benchmark measures kernels that have only the first k steps, for each k.
 # The time of step k is the time for k steps, minus the time for k - 1 steps.
 # For one configuration, the benchmark measures seven lines of Python (`_calls`).
-# Only the seventh line, a call of the robot's method, contains all steps.
 # The time of a step follows from differences between the times of the lines.
 
 #: The steps of a batch, each with the instructions of the compiled program that the step executes.
@@ -172,7 +170,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """For each robot and quantity, yield the time of each step (ns per configuration)."""
+    """Yield the time of each step (ns per configuration), for each robot and quantity."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [
@@ -189,7 +187,6 @@ def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 def truncate_program(program: KernelProgram, parts: int) -> KernelProgram:
-    """Copy the first `parts` steps of a program."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
     code = words[words[ProgramHeader.CODE] :].reshape(-1, INSTRUCTION_WIDTH)

@@ -12,7 +12,7 @@ from scripts.benchmarking.machine import EMPTY, STORED
 from scripts.pages import insert_parts
 from scripts.pages import table as markdown
 
-#: The measurements of one contender, as a mapping.
+#: A `Row` as a mapping.
 Entry = Mapping[str, Any]
 _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
@@ -116,8 +116,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
         yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # Rows are grouped by quantity, then by contender.
-            # Groups are in the order of their first rows.
+            # Groups of equal quantity, then of equal contender, are in the order of their first rows.
             keys = [(row["quantity"], row["label"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["label"])))

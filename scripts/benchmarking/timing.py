@@ -24,17 +24,10 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class TimedTask:
-    """A timed task.
-
-    Attributes:
-        n: Number of configurations that one call of `compute` computes.
-    """
-
     label: str
-    n: int
+    n: int  # number of configurations that one call of `compute` computes
     compute: Callable[[], object]
-    #: Function that returns the results in urdfkin's conventions.
-    #: Without this function, the results are not compared.
+    #: Function that returns the results in urdfkin's conventions; None: the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
     remark: str = ""
@@ -42,21 +35,15 @@ class TimedTask:
 
 @dataclass(frozen=True)
 class Row:
-    """The measurements of one contender.
-
-    Attributes:
-        numbers: Number of values in one result.
-        size: Number of joints, frames or configurations, in a section that varies this number. Otherwise 0.
-        n: Number of configurations in a call.
-    """
+    """The measurements of one contender."""
 
     section: str
     robot: str
     quantity: str
-    numbers: int
-    size: int = 0
+    numbers: int  # number of values in one result
+    size: int = 0  # number of joints, frames or configurations, in a section that varies this number
     label: str = ""
-    n: int = 0
+    n: int = 0  # number of configurations in a call
     median_ns: float = 0.0
     minimum_ns: float = 0.0
     #: Median time of the baseline, divided by the median time of the contender.
@@ -115,7 +102,6 @@ def measure_rows(
     baseline: TimedTask | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
-    """Measure tasks that have already run once."""
     times = measure_times(tasks, rounds, clock)
     medians = {label: float(np.median(values)) for label, values in times.items()}
     return [
@@ -134,25 +120,17 @@ def measure_rows(
 
 @dataclass(frozen=True)
 class Calls:
-    """The lines of Python that call a library.
-
-    The timed loop contains the lines, without another function call.
-    """
+    """The lines of Python that call a library; the timed loop contains them directly."""
 
     label: str
     #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.
     names: Mapping[str, Any]
-    #: Lines that compute one result.
-    #: The value of the last line is the result.
-    lines: tuple[str, ...]
-    #: Lines that write the result of configuration k into `out[k]`.
-    #: If `store` is None, the benchmark writes the value of the last line in `lines` into `out[k]`.
+    lines: tuple[str, ...]  # The value of the last line is the result.
+    #: Lines that write the result of configuration k into `out[k]`; None: the result of `lines` is written.
     store: tuple[str, ...] | None = None
-    #: `order[i]` is urdfkin's index of the library's coordinate i.
-    #: If `order` is None, the library and urdfkin have the same order of coordinates.
+    #: `order[i]` is urdfkin's index of the library's coordinate i; None: the same order.
     order: list[int] | None = None
-    #: Shape of the library's result for one configuration.
-    #: If `shape` is None, the result has the shape of urdfkin's result.
+    #: Shape of the library's result for one configuration; None: the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
     #: Function that converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)

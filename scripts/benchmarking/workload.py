@@ -80,7 +80,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a copy without visuals, collisions and mimic rules.
 
     All links get the same inertia, because some libraries need inertias.
-    Links and joints named `world` are renamed, because some libraries add this body.
+    The name `world` is replaced, because some libraries add a body of this name.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))

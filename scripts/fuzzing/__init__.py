@@ -25,11 +25,5 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test.
-
-    Attributes:
-        result: Short description. The test failed if the description is not in `PASSED`.
-    """
-
-    result: str
+    result: str  # short description; the test failed if it is not in `PASSED`
     details: str = ""

@@ -30,13 +30,12 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of links and joints whose frames one call computes.
 FRAMES_PER_CALL = 12
-#: Maximum number of calls for single frames, which are compared with calls for several frames.
+#: Maximum number of frames for which a call is compared with a call for several frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Standard deviation of each coordinate of the far base's position, in metres.
 FAR = 1e6
-#: Quantities that one call computes for several frames, with the number of inputs.
-#: The inputs are 1: q, 2: q and v, 3: q, v and a.
+#: Quantities that one call computes for several frames, with the number of inputs q, v and a.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -114,7 +113,6 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
 
 
 def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the name and result of each checked computation."""
     generator = np.random.default_rng(seed)
     inputs = _draw_inputs(robot, seed)
     frames = robot.all_frames
@@ -136,11 +134,10 @@ def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
                 except RepresentationSingularityError:
                     continue
                 yield f"analytical_jacobian {representation}", J
-    yield from _tables(robot, alone)
+    yield from _table_placements(robot, alone)
 
 
 def compare_prepared(robot: Robot, seed: int) -> None:
-    """Compare a prepared frame with the robot's methods."""
     inputs = [x[0] for x in _draw_inputs(robot, seed)]
     frame = robot.all_frames[-1]
     for reference in Reference:
@@ -224,8 +221,7 @@ def _placements_by_name(
                 raise
 
 
-def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the placements of Denavit-Hartenberg tables."""
+def _table_placements(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
     tree = robot.tree
     for frame in frames:
         if any(tree.joints[i].nq > 1 for i in tree.path(tree.frame_link(frame))):

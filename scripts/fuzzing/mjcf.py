@@ -19,8 +19,7 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: A placement may differ from MuJoCo's by `_TOLERANCE * large`, see `find_difference`.
-#: Equality constraints have 1000 times this tolerance.
+#: Tolerance for placements relative to `large` in `find_difference`; 1000 times larger for constraints.
 _TOLERANCE = 1e-12
 
 # Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.

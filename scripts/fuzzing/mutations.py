@@ -14,8 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size in bytes of a file that the script mutates.
-#: Mutants of larger files are slow to test.
+#: Maximum size (bytes) of a mutated file, because mutants of larger files are slow to test.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -44,8 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: Half of all changes are in the family `_STRUCTURE`,
-#: because urdfkin rejects most mutants of the other families.
+#: Half of all changes are of `_STRUCTURE`, because urdfkin rejects most mutants of the other families.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
@@ -88,8 +86,7 @@ def _change_tokens(rng: random.Random, kind: str, data: bytes) -> bytes:
         odd = (b"\n", b"<!DOCTYPE robot>", b'<!DOCTYPE r [<!ENTITY a "b">]>', b"<!-- -->", b"text")
         return rng.choice(odd) + data
     pattern = {"odd_number": _NUMBER, "odd_blank": re.compile(rb" ")}.get(kind, _VALUE)
-    # Take the first match after a random position.
-    # A search for all matches takes longer.
+    # The first match after a random position is found faster than all matches.
     starts = [rng.randrange(len(data) + 1) for _ in range(2)]
     first, second = (pattern.search(data, position) or pattern.search(data) for position in starts)
     if first is None or second is None:

@@ -68,10 +68,7 @@ def usual_length(rng: random.Random) -> float:
 
 
 def odd_length(rng: random.Random) -> float:
-    """Return a length of random magnitude and sign.
-
-    Each length is below 1e301, so a sum of several lengths does not overflow.
-    """
+    """Return a length of random magnitude, below 1e301 so that a sum of lengths does not overflow."""
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
     return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)

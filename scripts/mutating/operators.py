@@ -53,11 +53,7 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Put the mutant's value into the tree; restore the old value after the `with` block.
-
-        Yields:
-            The replaced value.
-        """
+        """Put the mutant's value into the tree for a `with` block, and yield the replaced value."""
         old = self.put(self.value)
         try:
             yield old
@@ -74,10 +70,7 @@ class Change:
 
 
 def list_changes(tree: ast.Module) -> list[Change]:
-    """Return all mutants of a file.
-
-    Applying a mutant changes the given tree.
-    """
+    """Return all mutants of a file; applying a mutant changes the given tree."""
     return [
         change
         for node in _executed_nodes(tree)
@@ -104,10 +97,9 @@ def function_at(tree: ast.Module, line: int) -> str:
 
 
 def replace_code(source: str, function: str, before: str, after: str) -> ast.Module:
-    """Replace a piece of code in one function.
+    """Replace a piece of code that a function or class contains exactly once.
 
-    `function` names a function or a class; "" is the whole file.
-    The function must contain `before` exactly once.
+    The name "" means the whole file.
     """
     tree = ast.parse(source)
     alternatives = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
@@ -162,7 +154,6 @@ def _parse_as(code: str, kind: type) -> list[ast.AST]:
 
 
 def _executed_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes that can have mutants."""
     yield node
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "format_spec", "type_params"):
@@ -225,7 +216,7 @@ def _other_value(value: bool | int | float) -> bool | int | float:
 
 
 def _concerns_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Return whether an operand is a string or None."""
+    """Return whether a constant operand is a string or None."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(
         isinstance(part, ast.JoinedStr)

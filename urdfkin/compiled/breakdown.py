@@ -6,7 +6,9 @@
 | w_{k-1} | angular velocity of link k-1 |
 | d | vector from the joint's origin to the frame's origin |
 
-For `Reference.WORLD`, the world's origin replaces the frame's origin in u_k and d.
+For `Reference.WORLD`, the world's origin replaces the frame's origin in u_k and d. For the other reference
+frames, d is the sum of the interorigin vectors after the joint (7.110). A difference of two positions in the
+world would lose digits if the robot is far from the world's origin or has a long link.
 
     u_k = v_k z x d    for a revolute joint
     u_k = v_k z        for a prismatic joint
@@ -20,10 +22,6 @@ sum of these terms over all joints:
 | centripetal | v_k z x (v_k z x d) | velocity of a revolute joint |
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
-
-For the other reference frames, d is the sum of the interorigin vectors after the joint (7.110). A difference
-of two positions in the world would lose digits if the robot is far from the world's origin or has a long
-link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
 planar or floating joint has an additional Coriolis term, because the joint's axes of translation rotate. The
@@ -114,7 +112,7 @@ class AccelerationBreakdown(Displayable):
 
 
 class _RelativeMotion(NamedTuple):
-    """Velocity or acceleration of a joint relative to its parent link; (n, 3) arrays in world axes."""
+    """A joint's velocity or acceleration relative to its parent link, (n, 3) each, in world axes."""
 
     linear: FloatArray
     angular: FloatArray
@@ -215,7 +213,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return the joint's translation (n, 3) in the joint's axes; 0 for a revolute joint."""
+    """Return the joint's translation (n, 3) in the joint's axes."""
     translation = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
@@ -265,10 +263,7 @@ def _relative_motion(joint: Joint, x: FloatArray, R: FloatArray) -> _RelativeMot
 
 
 def _base_acceleration(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point fixed to the base (7.123).
-
-    `d` is the vector from the base's origin to the point.
-    """
+    """Return the acceleration of a point fixed to the base, at `d` from the base's origin (7.123)."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

@@ -50,10 +50,8 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Smallest size (bytes) of results that are written directly to memory.
-#: Results of this size do not fit into the caches.
+#: Results of at least this size (bytes) bypass the caches, because they would not fit.
 _MIN_BUFFERED_BYTES = 2 << 20
-#: Maximum number of doubles in the buffer of results.
 #: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_DOUBLES = 3072
 
@@ -180,10 +178,9 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch without a kernel.
+    """Compute a batch without a kernel; return None if a kernel must compute the batch.
 
-    Return 0 for valid inputs, and 1 if an input is nan, inf or too large. Return None if a kernel must
-    compute the batch.
+    Otherwise, return 1 if an input is nan, inf or too large, else 0.
     """
     if preload.get_kernel(name) is not None:
         return None
@@ -289,8 +286,7 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
 #: Starting a thread takes about ten microseconds.
 _MIN_THREADED_ROWS = 4096
 
-#: Number of configurations that NumPy computes at a time.
-#: The intermediate results of so many configurations fit into the cache.
+#: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
 ROWS_PER_PART = 2048
 
 #: A function that computes rows of `out` from rows of `inputs`.

@@ -1,8 +1,7 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-The state of a link consists of vectors. The functions `state_for_...` replace the vectors that an output does
-not need by `unused()`. Jacobian columns are computed in world axes. For LOCAL, the columns are then rotated
-to the frame's axes.
+The functions `state_for_...` replace unneeded vectors of a link's state by `unused()`. Jacobian columns are
+computed in world axes. For LOCAL, the columns are then rotated to the frame's axes.
 """
 
 from __future__ import annotations
@@ -25,8 +24,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: A pose has 16 elements, and a velocity or an acceleration has six numbers.
-#: These arrays list the scratch row of each number.
+#: Scratch row of each element of a pose (16), and of each number of a velocity or acceleration (6).
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -170,10 +168,7 @@ def write_jacobian_rate_column(scratch, row, to, flags, constants, multiplier_in
 
 
 def _reference_point(reference, x):
-    """Return the position or velocity of the Jacobian's reference point.
-
-    `x` is the position or velocity of the frame's origin.
-    """
+    """For WORLD, replace the frame's origin or its velocity by 0, because the world's origin is fixed."""
     if reference == _WORLD:
         nil = broadcast(0.0)
         x = nil, nil, nil

@@ -39,7 +39,7 @@ class JointMotion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`; for an array, its first column.
+    """First column of each quantity in `CompiledTree.geometry`.
 
     Attributes:
         R: Rotation matrix from this joint's axes to the previous moving joint's axes, row by row.
@@ -69,9 +69,8 @@ _MOTION_OF_KIND = {
     JointKind.FLOATING: JointMotion.FLOATING,
 }
 
-#: Motions of each kind of joint. A motion is a pair (axis, is_rotation).
-#: `axis`: 0 for x, 1 for y, 2 for z of the joint's frame.
-#: `is_rotation`: True for a rotation, False for a translation.
+#: Motions (axis, is_rotation) of each kind of joint.
+#: The axes 0, 1 and 2 are x, y and z of the joint's frame.
 _AXIS_MOTIONS: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
@@ -103,8 +102,8 @@ class CompiledTree:
     | tilts | (frames,) | sum of `Joint.pinocchio_tilt` (rad) over these URDF joints, in output order |
 
     In `target_columns`, joints with the same index in v share the column of the first joint on the path.
-    An element of `lengths` is a sum of `Joint.length` over all joints, also fixed joints, after the previous
-    moving joint. If there is no previous moving joint, the sum begins at the base.
+    An element of `lengths` sums `Joint.length` over the joints after the previous moving joint, or after the
+    base. Fixed joints count too.
     """
 
     nq: int
@@ -207,13 +206,9 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """A link's pose relative to the last moving joint.
+    """A link's pose relative to the last moving joint."""
 
-    Attributes:
-        step: Row of the last moving joint in `CompiledTree.steps`; -1 if only fixed joints lead to the link.
-    """
-
-    step: int
+    step: int  # row of this joint in `CompiledTree.steps`; -1 if only fixed joints lead to the link
     T: FloatArray
     length: float
 
@@ -289,7 +284,7 @@ def _find_target_columns(columns: IntArray, parents: Sequence[int], ends: Sequen
 class Op(IntEnum):
     """Instructions of a program.
 
-    The suffix X, Y or Z names a coordinate axis. Instructions with a suffix are faster.
+    The suffix X, Y or Z marks a faster instruction for one coordinate axis.
     """
 
     END = 0
@@ -339,11 +334,9 @@ class ProgramHeader(IntEnum):
     BASE = 12
 
 
-#: Number of doubles in a row of scratch memory.
-#: A row has a double for each of eight configurations.
+#: A row of scratch memory has a double for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers in an instruction.
 #: An instruction contains the operation, three operands, and the index of its first constant.
 INSTRUCTION_WIDTH = 5
 #: Number of integers that describe a joint angle in a program.
@@ -403,7 +396,7 @@ def compile_program(
     """Return the program for a tree's frames.
 
     `orientations` must be true for placements and for results in frame axes.
-    A Hessian needs separate columns for mimic joints.
+    With `hessian`, mimic joints have separate columns.
     """
     key = orientations, columns, hessian
     program: KernelProgram | None = plan.cache.get(key)
@@ -468,10 +461,9 @@ class _ProgramWriter:
                 now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _joints_and_frames(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield joints and frames in the recursion's order.
+        """Yield (previous moving joint, joint, None) or (last moving joint, None, frame).
 
-        A joint gives the tuple (previous moving joint, joint, None). A frame gives the tuple (last moving
-        joint, None, frame). The number -1 means the base.
+        The order is that of the recursion. The number -1 means the base.
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -484,8 +476,7 @@ class _ProgramWriter:
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
         """Save the state of `step` to memory if a later instruction needs this state.
 
-        `following` is the index of the next joint or frame. The next joint or frame does not need the saved
-        state, because the registers still contain it.
+        The next joint or frame (index `following`) still finds the state in the registers.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
@@ -502,7 +493,7 @@ class _ProgramWriter:
         return len(self.constants) - len(numbers)
 
     def _add_transform(self, R: FloatArray, p: FloatArray, *, orientations: bool = True) -> bool:
-        """Add the needed instructions; return whether an instruction was added."""
+        """Return whether an instruction was needed."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -542,7 +533,7 @@ class _ProgramWriter:
         )
 
     def _add_frame(self, f: int) -> bool:
-        """Add a frame's instructions, and return whether the state in the registers changes."""
+        """Return whether the state in the registers changes."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._add_transform(offsets[:9].reshape(3, 3), offsets[9:], orientations=self.orientations)
         sources = 0
@@ -591,11 +582,9 @@ def _needed_block_starts(indices: Sequence[int]) -> list[int]:
     return sorted({int(index) // 8 * 8 for index in indices})
 
 
-#: Number of bytes in a cache line.
-#: Access to a vector in two cache lines takes twice as long as access to a vector in one cache line.
+#: Size (bytes) of a cache line. Access to a vector in two lines takes twice as long as in one line.
 _CACHE_LINE = 64
 #: The integer that represents each reference frame in a kernel.
-#: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
@@ -618,8 +607,7 @@ class KernelArgs(IntEnum):
     #: Address of the base's state (rows of 24 numbers).
     #: The address is 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Stride (in doubles) between consecutive configurations.
-    #: If a stride is 0, all configurations use the same row.
+    #: Stride (doubles) between consecutive configurations; 0 if all configurations use the same row.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

@@ -1,9 +1,8 @@
 """Decide when a kernel is loaded or compiled.
 
 Numba is imported only when a kernel is loaded or compiled. For a few configurations, plain Python takes less
-time than loading or compiling a kernel. For each kernel, this module therefore sums up the time (s) that
-plain Python has taken. The sum includes the estimated time of the next computations. If the sum reaches a
-threshold of this table, the module takes the action beside it.
+time than loading or compiling a kernel. For each kernel, this module therefore sums up the time (s) of plain
+Python, including the estimated time of the next computations. At each threshold, the module takes an action:
 
 | time in plain Python | action |
 |---|---|
@@ -41,8 +40,7 @@ _SECONDS_SAVED_PER_CALL = 5e-5
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two groups of kernels with about equal compile times.
-#: Each of two processes compiles a group.
+#: Two groups of kernels with about equal compile times, one for each of two processes.
 _FIRST_PROCESS_KERNELS = "accelerations", "local_accelerations", "velocities"
 _SECOND_PROCESS_KERNELS = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -95,10 +93,9 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 
 
 def should_load_single_evaluator(name: str) -> bool:
-    """Return whether to use the kernel `one_configuration`, after loading the kernel if necessary.
+    """Return whether to use the kernel `one_configuration`, and load the kernel if it saves time.
 
-    The result is False until a batch kernel of the quantity `name` is loaded. Each later call counts as
-    `_SECONDS_SAVED_PER_CALL` seconds in plain Python.
+    Without a selected mode, the result is False until a batch kernel of the quantity `name` is loaded.
     """
     if _modes:
         return _modes[-1] == "compiled"
@@ -129,8 +126,7 @@ def _is_on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Python code for the second process.
-#: The process ends when its standard input closes.
+#: Python code with which the second process ends when its standard input closes.
 #: The standard input closes when the first process ends.
 _EXIT_WITH_PARENT_CODE = (
     "import os, sys, threading;"

@@ -202,7 +202,6 @@ def unused() -> ConstantNumber:
 
 
 def round_product(x: Any) -> Any:
-    """Convert a `Product` to a rounded `Number`."""
     return Number(x.x * x.y) if type(x) is Product else x
 
 
@@ -234,10 +233,7 @@ def array_data(array: Any) -> Any:
 
 
 def doubles_at(address: Any) -> Any:
-    """Return the list `address`.
-
-    The compiled `doubles_at` converts an address to a pointer.
-    """
+    """Return the list `address`; the compiled function converts an address to a pointer."""
     return address
 
 

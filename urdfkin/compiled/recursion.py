@@ -119,10 +119,7 @@ def express_after_rotation(axes, S, x):
 
 
 def translate_frame(axes, state, d):
-    """Move the frame's origin by d (7.58, 7.128, 7.130).
-
-    The vector d is in link axes.
-    """
+    """Move the frame's origin by d, in link axes (7.58, 7.128, 7.130)."""
     R, p, w, vel, alpha, acc = state
     lever = express(axes, R, d)
     return (
@@ -149,7 +146,7 @@ def rotate_frame(axes, state, S):
 
 
 def _rotate_about_z(axes, state, scratch, row):
-    """Rotate about z (7.5). The sine is in scratch row `row`, and the cosine is in the next row."""
+    """Rotate about z (7.5). Scratch row `row` contains the sine, and the next row the cosine."""
     return rotate_frame(
         axes, state, eq.about_z(load_number(scratch, row), load_number(scratch, row + 1), zero(), one())
     )
@@ -171,9 +168,9 @@ def after_prismatic(axes, state, slide, v, a):
 
 
 def add_free_motion(axes, state, o, u, o_rate, u_rate):
-    """Add the motion of a planar or floating joint.
+    """Add the velocity and acceleration of a planar or floating joint, in the child link's axes.
 
-    The motion is in the child link's axes. The state must already contain the joint's displacement.
+    The state must already contain the joint's displacement.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = (
@@ -319,8 +316,7 @@ def _restore_state(scratch, row, state):
 def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row):
     """Read whole blocks of eight numbers, which is faster.
 
-    For example, if q has 6 coordinates, the function may read 8 numbers. The last two numbers go to the
-    scratch rows of v. If the recursion needs v, these rows are overwritten later.
+    Surplus numbers go to the scratch rows of the next input. If that input is needed, it is read later.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -475,8 +471,7 @@ def _compute_block(
     at, buffer = program[_CODE], args[_BUFFER]
     to, first = (doubles_at(buffer), 0) if buffer else (doubles_at(args[_OUT]), start)
     if args[_BASE] == 0 and _TRANSLATE_X <= program[at] <= _TRANSLATE:
-        # The base is at rest.
-        # If the first instruction is a translation, only the position changes.
+        # The base is at rest, so a translation from the base changes only the position.
         state = _shift_position(state, _constant_vector(constants, program[at + 4]))
         at += INSTRUCTION_WIDTH
     while program[at] != _END:

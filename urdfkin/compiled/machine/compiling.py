@@ -142,11 +142,8 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Without fast math, the compiler neither reorders nor fuses operations.
-#: The module `numbers` decides which operations are fused.
-#: Results therefore do not depend on the compiler.
-#: Division by zero gives inf, as in C.
-#: Loops therefore contain no branch that raises an error.
+#: Without fast math, the compiler neither reorders nor fuses operations, so results do not depend on it.
+#: Division by zero gives inf, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so arrays need no reference counts.
 COMPILE_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _INLINE_OPTIONS: dict[str, Any] = {
@@ -268,8 +265,5 @@ def inline_function(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator that makes kernels.
-
-    `arguments` are the Numba types of a kernel's arguments.
-    """
+    """Return a decorator that makes kernels with arguments of the given Numba types."""
     return lambda function: Kernel(function, arguments)

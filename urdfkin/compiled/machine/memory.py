@@ -83,10 +83,7 @@ def broadcast(context: Any, x: Any) -> Any:
 
 @intrinsic
 def array_data(context: Any, array: Any) -> Any:
-    """Return a pointer to the numbers.
-
-    Indices must not be negative.
-    """
+    """Return a pointer to the numbers. Unlike an array, a pointer has no negative indices."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -105,7 +102,6 @@ def _make_pointer_function(kind: Any) -> Any:
     return pointer_at
 
 
-#: Functions that convert an address to a pointer to doubles or integers.
 doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
@@ -129,11 +125,9 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose each square block of a matrix.
+    """Transpose each square block of a matrix; the number of rows (`vectors`) must be a power of two.
 
-    `vectors` are the rows of the matrix. The number of rows must be a power of two. Each pass divides the
-    matrix into blocks of 2 w by 2 w numbers, and exchanges two quarters of each block: the upper right
-    quarter and the lower left quarter.
+    Each pass exchanges the upper right and the lower left quarter of each block of 2 w by 2 w numbers.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -152,8 +146,6 @@ def _add_constant(builder: Any, number: Any, constant: int) -> Any:
 
 
 def _make_reader(width: int) -> Any:
-    """Make a function that reads `width` numbers per configuration."""
-
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, scratch: Any, row: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -175,8 +167,6 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Make a function that writes `width` numbers per configuration."""
-
     @intrinsic
     def write(context: Any, scratch: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -273,7 +263,6 @@ def prefetch(x, at, count):
             _prefetch(x, number)
 
 
-#: Prefetch distance in doubles.
 #: While `x[at]` is read, `x[at + _PREFETCH_DISTANCE]` is loaded into the cache.
 _PREFETCH_DISTANCE = 512
 
@@ -353,10 +342,11 @@ def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @inline
 def stream(x, count, to, at, address):
-    """Copy numbers; whole cache lines bypass the caches.
+    """Copy `count` numbers to `to[at]` and the next elements; whole cache lines bypass the caches.
 
-    A processor that writes a whole cache line does not read it first. `count` must be at least 7, because up
-    to 7 numbers precede the first whole line. `address` is the address of `to[0]`.
+    A store into the caches first reads the cache line; a store that bypasses the caches does not.
+    `count` must be at least 7, because up to 7 numbers precede the first whole line. `address` is the address
+    of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

@@ -213,10 +213,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return a number as an LLVM vector.
-
-    `unused()` is not allowed.
-    """
+    """Return a number as an LLVM vector; `unused()` is not allowed."""
     return _Value(context, builder, kind, value).number(width)
 
 

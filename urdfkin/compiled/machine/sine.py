@@ -83,8 +83,7 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         r_error = build_fma(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_error = build_fma(builder, r, r, builder.fneg(z))
-        # `leading`: 1 - z/2, the beginning of the cosine's series.
-        # The variable `leading_error` is the rounding error of `leading`.
+        # `leading` is 1 - z/2, the beginning of the cosine's series; `leading_error` is its rounding error.
         leading = build_fma(builder, z, all_lanes(-0.5), all_lanes(1.0))
         leading_error = build_fma(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), leading))
         # sin(r + r_error) = sin r + r_error cos r to first order.

@@ -132,8 +132,8 @@ def _doubles_address(array, ndarray, flags, axes, rows, columns):
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration.
 
-    `arguments` is the address of `count` arguments: one to three inputs, then the output array or None. The
-    inputs are q, v and a. `bound` is the address of a tuple:
+    `arguments` is the address of `count` arguments: (q), (q, v) or (q, v, a), then the output array or None.
+    `bound` is the address of a tuple:
 
     | Item of `bound` | Object |
     |---|---|
@@ -239,10 +239,10 @@ _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
 def make_single_evaluator(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Make a function for one configuration.
+    """Make a function for one configuration; the base is fixed at the world's origin.
 
-    `plan` must have one frame. The base is fixed at the world's origin. The returned array contains the
-    kernel's arguments. The function counts its valid results in `KernelArgs.COUNT`.
+    `plan` must have one frame. The returned array contains the kernel's arguments; its element
+    `KernelArgs.COUNT` counts the valid results.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
@@ -260,10 +260,7 @@ def make_single_evaluator(
 def wrap_c_function(
     c_function: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Make a function that calls a C function instead of a kernel.
-
-    The returned array contains the C function's arguments.
-    """
+    """Make a function as `make_single_evaluator` does, from a C function instead of a kernel."""
     address = ctypes.cast(c_function, ctypes.c_void_p).value
     return _make_evaluator(address or 0, orders, shape, plan, c_function)
 
