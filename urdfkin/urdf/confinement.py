@@ -92,7 +92,7 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or a path below `root`. Below `root`, no name may begin with a dot."""
+    """Return whether `path` is `root`, or a path below `root` without hidden files and folders."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep

@@ -154,7 +154,7 @@ _KIND_BY_CLASS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: Limits above this number are treated as infinite. Pinocchio stores a missing limit as the largest double.
+#: Larger limits are treated as infinite, because Pinocchio stores a missing limit as the largest double.
 _INFINITE_LIMIT = 1e300
 
 
@@ -163,8 +163,8 @@ class ConvertedModel:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: Maps the name of a link to the index of a Pinocchio joint. Link and joint have the same frame.
-        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame.
+        joints: Index of the Pinocchio joint that has the same frame, by link name.
+        frames: Index of the Pinocchio frame, by link name, for the links that are not in `joints`.
     """
 
     tree: KinematicTree
@@ -200,9 +200,9 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: Maps the index of a joint to the name of the link that the joint moves.
+        #: Name of the link that a joint moves, by the index of the joint.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: Maps the index of a converted frame to the name of its link.
+        #: Name of the link, by the index of the converted frame.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 

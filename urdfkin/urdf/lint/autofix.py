@@ -35,8 +35,7 @@ from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, Robot
 from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file.
-#: The fixes of one pass do not overlap.
-#: Each pass fixes only findings with the same code, such as URDF303.
+#: One pass applies the fixes of one code, except overlapping fixes.
 MAX_PASSES = 100
 
 #: Rounding to doubles rotates a unit vector by at most this angle (rad).
@@ -112,10 +111,10 @@ def _find_objections(before: Examination, after: Examination, fixable: list[Find
 
 
 def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str, float]) -> Iterator[str]:
-    """Yield a message for each difference between two robots.
+    """Yield messages about differences between two robots, at most one for each joint.
 
-    The function compares the version, the links, and the joint values that URDF readers use. For each joint
-    name, `max_rotations` contains the largest permitted rotation (rad) of the joint origin.
+    The function compares the version, the links, and the joint values that URDF readers use. `max_rotations`
+    contains the largest permitted rotation (rad) of a joint origin, by joint name.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
@@ -166,10 +165,8 @@ def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
     return None if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
-#: Bytes per line of git's binary patch.
 _PATCH_BYTES_PER_LINE = 52
-#: First letters of the lines in git's binary patch.
-#: A letter encodes the number of bytes of the line.
+#: The first letter of a line in git's binary patch encodes the number of bytes of the line.
 _PATCH_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 

@@ -27,7 +27,7 @@ def as_sarif(
     """Return a SARIF document with all rules about URDF files, and a result for each finding.
 
     Rules about MJCF and USD are included only if a finding has their code. Each pair in `silenced_findings`
-    is a finding and the reason in the comment. SARIF marks these findings with the entry `suppressions`.
+    is a finding and the reason in the comment.
     """
     codes = {finding.code for finding in findings}
     rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}

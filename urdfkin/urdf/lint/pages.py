@@ -36,7 +36,6 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 }
 
 URDF_RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The rules about MJCF and USD files.
 MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule about URDF files. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
@@ -137,9 +136,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
-#: Maximum line length of a printed example.
 _MAX_EXAMPLE_WIDTH = 100
-#: Width of prose on a terminal, in characters.
 PROSE_WIDTH = 88
 
 

@@ -111,10 +111,9 @@ def examine(
     fold: bool = False,
     is_reported: Callable[[Finding], bool] | None = None,
 ) -> Examination:
-    """Check a text; the function `check` documents the arguments.
+    """Check a text; `check` documents the arguments.
 
-    `is_reported` returns False for a finding that must not be reported. The function removes these findings
-    before it combines findings with the same code.
+    A finding is removed if `is_reported` returns False. Then findings with the same code are combined.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic

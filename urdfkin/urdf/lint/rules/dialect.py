@@ -146,7 +146,7 @@ UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extension elements may contain anything, even `<joint>` and `<link>`.
+#: These elements may contain anything, even `<joint>` and `<link>`.
 EXTENSION_ELEMENTS = frozenset(
     {"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"}
 )
@@ -371,7 +371,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribu
 
 
 def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix, with the name of its attribute or with None for the tag's prefix."""
+    """Yield each namespace prefix, and the name of its attribute or None for the tag."""
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
@@ -385,8 +385,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 LINE_BREAK_IN_NAME = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Maximum number of characters of a name; URDF405 reports longer names.
-#: Longer names break tables and file paths.
+#: URDF405 reports longer names, because they break tables and file paths.
 MAX_NAME_LENGTH = 200
 
 
@@ -512,11 +511,7 @@ def _read_comment(
 
 
 def check_unused_comments(report: Reporter) -> None:
-    """Report unused codes in comments such as `<!-- urdfkin: ignore[URDF503] the reason -->`.
-
-    A code is unused if the comment silences no finding with this code. Call this function after all
-    other rules.
-    """
+    """Report codes in comments that silence no finding. Call this function after all other rules."""
     for ignore in report.comment_index.comments:
         for code in ignore.codes:
             if code not in ignore.used_codes:

@@ -233,7 +233,7 @@ def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
 
-    Return None if the angle is at most `_NEGLIGIBLE_TILT`.
+    Return None if Pinocchio uses `axis` itself, or if the angle is at most `_NEGLIGIBLE_TILT`.
     """
     if axis is None:
         return None
@@ -331,8 +331,7 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: The limits of a mimic joint can exclude part of the mimicked joint's range.
-#: URDF527 reports an excluded part that is larger than this fraction of the range.
+#: URDF527 reports limits that exclude more than this fraction of the mimicked joint's range.
 #: Limits with few digits often exclude a smaller part.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
@@ -455,10 +454,7 @@ class _MimicChecker:
         )
 
     def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the last joint of the chain.
-
-        The last joint is None if the joint does not exist, or if the chain contains a cycle.
-        """
+        """Return the combined rule of a mimic chain, and its last joint (None if missing, or in a cycle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.mimicked_joint, mimic.multiplier, mimic.offset)
@@ -473,10 +469,7 @@ class _MimicChecker:
 
 
 def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
-
-    Return None for other joint types, for a missing `<limit>`, and for lower >= upper.
-    """
+    """Return the limits of a revolute or prismatic joint, or +- pi for a continuous joint; otherwise None."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -534,7 +527,7 @@ _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 
 
 def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
-    """Report legal values that are probably mistakes. `is_tree` is True if the joints form a tree."""
+    """Report legal values that are probably mistakes."""
     reach = _reach(robot) if is_tree else {}
     slides = any(joint.kind in ("prismatic", "planar", "floating") for joint in robot.joints)
     condition = " if all translations are 0" if slides else ""
@@ -580,8 +573,7 @@ def _check_rounded(
 ) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
-    The message quotes the angle with the largest rounding error. The distance to the links below is at most
-    `reach` (m) under the condition `condition`, a text for the message.
+    `reach` (m) bounds the distance to the links below; `condition` is the condition of this bound as text.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
