@@ -1,4 +1,4 @@
-"""Define findings: problems in a URDF, each with a code, a position, the wrong text and a remedy.
+"""Findings: problems in a file, each with a code, a position, the wrong text and a remedy.
 
 Line and column numbers do not count a byte order mark.
 
@@ -347,8 +347,9 @@ class Rule:
 
     Attributes:
         id: The code of the findings: `URDF`, `MJCF` or `USD`, and three digits. A code is never reused. The
-            first digit of a URDF code is the topic. 1: text and XML. 2: elements and attributes. 3: numbers.
-            4: names and structure. 5: joints. 6: probable mistakes. 7: inertials, geometry and materials.
+            first digit of a URDF code is the topic: text and XML (1), elements and attributes (2), numbers
+            (3), names and structure (4), joints (5), probable mistakes (6), or inertials, geometry and
+            materials (7).
     """
 
     id: str

@@ -2,9 +2,8 @@
 
 Objects of ElementTree, lxml and yourdfpy become URDF text. A Model of Pinocchio becomes a kinematic tree.
 
-urdfkin recognizes an object of yourdfpy or Pinocchio by the module names of its class and base classes. An
-object with the attributes `tag`, `attrib` and `iter` counts as an element of ElementTree or lxml. Therefore
-urdfkin does not import yourdfpy, lxml or Pinocchio to recognize an object.
+urdfkin recognizes an object by the module names of its class and base classes, or by the attributes `tag`,
+`attrib` and `iter` of an element. Therefore, urdfkin does not import a library to recognize its objects.
 """
 
 from __future__ import annotations

@@ -111,7 +111,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        If `fused_model` is not None, it computes its own frames, and `model` computes the other frames.
+        If `fused_model` is not None, it computes the frames that it contains; `model` computes the others.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))

@@ -69,8 +69,8 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: Rounding changes the length of a stored quaternion by at most u.
 #: Therefore, the cosine between two axes changes by at most 4 u.
 _MAX_SHEAR = 14.0
-#: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
-#: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
+#: A revolute joint with limits up to this angle (degrees) hardly moves.
+#: USD303 (limits that are probably in radians) omits such a joint.
 _NEGLIGIBLE_LIMIT_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
@@ -641,11 +641,11 @@ class _StageReader:
     def _read_joint_frame(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return body i of a joint, the pose of the joint frame in the body, and two terms of error bounds.
+        """Return body i of a joint, the pose of the joint frame in the body, a length sum and error bounds.
 
-        The body None is the world. The first term is the sum of the lengths (m) of all vectors that are added
-        to compute the position. The second term contains bounds on the rounding errors of the position (m)
-        and the orientation (rad). Return None for a body that does not exist or is in a point instancer.
+        The body None is the world. `UsdJoint` defines the length sum (m). The error bounds are for the
+        position (m) and the orientation (rad). Return None for a body that does not exist or is in a point
+        instancer.
         """
         p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
         quaternion = self._read_value(prim, f"physics:localRot{i}")

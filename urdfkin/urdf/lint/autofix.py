@@ -8,10 +8,9 @@ A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new f
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
   change by at most `Fix.max_rotation` (rad).
 
-A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence. urdfkin escapes this text, but `git apply` refuses escaped
-lines. Therefore, urdfkin writes a git binary patch if a line must be escaped. A comment before the binary
-patch shows the escaped lines.
+A line of the file can contain text that controls a terminal or a CI service, for example an escape sequence.
+A printed patch must escape this text, but `git apply` refuses escaped lines. Therefore, urdfkin then writes a
+git binary patch, and a comment with the escaped lines before the binary patch.
 """
 
 from __future__ import annotations

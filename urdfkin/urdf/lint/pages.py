@@ -2,8 +2,8 @@
 
 The rules are defined in the parser and in the modules of `lint.rules`. Each module has a TOML file beside the
 module. For example, `joints.toml` belongs to `joints.py`. For each rule of the module, the file has one TOML
-table, such as [URDF502]. The table contains the texts of the rule's page. If an entry such as `correction`,
-`other_readers` or `question` is at the top of the file, the entry is the default for all pages.
+table, such as [URDF502]. The table contains the texts of the rule's page. An entry at the top of the file,
+such as `correction`, is the default for all pages.
 
 The table `parts` defines texts that replace `{name}` in examples. Each entry is a string, or a pair
 [text, times] for a repeated text. In a repeated text, `{i}` is the index of the repetition. Line breaks in

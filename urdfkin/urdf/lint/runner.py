@@ -1,4 +1,4 @@
-"""Run all rules on a URDF: rules about bytes, XML, elements, names, joints, numbers and links.
+"""Run all rules on a URDF.
 
 `urdfkin.load` builds the robot from the records that the rules have checked.
 """

@@ -25,7 +25,7 @@ NEGLIGIBLE_MASS = 1e-3
 
 #: No principal moment may be negative or exceed the sum of the other two.
 #: The tolerance of these checks is this number (m^2) times the mass.
-#: A body with a mass of 1 kg and a radius of gyration of 0.03 mm has such a moment.
+#: This number is the moment of a body of 1 kg with a radius of gyration of 0.03 mm.
 NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of the moments of inertia, which exporters write with few digits.

@@ -95,7 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element, and the name of an attribute. If the name is None, the pair stands for the element.
+#: An element, and the name of an attribute or None for the element itself.
 _ElementOrAttribute = tuple[Element, str | None]
 
 

@@ -61,7 +61,7 @@ def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _check_loops_and_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Report loops, and links with several parent joints. Return True if there are none."""
+    """Report loops and links with several parents. Return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
@@ -138,7 +138,7 @@ PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
 #: If an axis length differs from 1 by less than this number, the finding is a note.
-#: Rounding the axis to few digits causes such small differences.
+#: The cause is probably that the axis is rounded to few digits.
 NOTE_LENGTH_ERROR = 2e-4
 
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
@@ -151,7 +151,7 @@ _Z_AXIS_TOLERANCE = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: If the angle (rad) between an axis and a coordinate axis is at most this number, it is not reported.
+#: An angle (rad) up to this number between an axis and a coordinate axis is not reported.
 #: The error bounds in `verify.bounds` cover this angle.
 _NEGLIGIBLE_TILT = 2.0**-52
 
@@ -435,8 +435,8 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # `restrict_range` subtracts a rounding error at both ends of the range, so a range of one value
-        # becomes empty. Therefore, each end of `moving` is tested alone.
+        # `restrict_range` subtracts a rounding error at both ends, so a range of one value becomes empty.
+        # Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -508,13 +508,11 @@ SUSPICIOUS_LENGTH = 100.0
 #: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
-#: A limit is probably in degrees if it is a whole number, and
-#: `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
+#: A whole number is probably in degrees if `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
 #: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: An angle of 1.57 instead of pi/2 displaces the links after the joint.
-#: The finding is a warning if the displacement exceeds this length (m).
+#: A rounded angle is a warning if the rounding moves the links after the joint by more than this length (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
 #: Maximum difference (rad) of an angle that counts as an exact k * pi.
