@@ -129,7 +129,7 @@ def limit_process(seconds: int) -> None:
 def confine(is_allowed: Callable[[str], bool]) -> None:
     """Permit only harmless audit events and reads of allowed files, until this process ends.
 
-    `is_allowed` receives the path of a file or folder. Any other event raises RefusedError.
+    Any other event raises RefusedError.
     """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:

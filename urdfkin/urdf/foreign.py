@@ -51,10 +51,9 @@ class XmlTree(Protocol):
 
 
 def convert_to_urdf(source: Any) -> tuple[str, str] | None:
-    """Convert an object of yourdfpy, ElementTree or lxml to URDF text.
+    """Return the URDF text of an object and a name for messages; None for an object of another library.
 
-    Return the URDF text, and the name that messages use for the object: `<yourdfpy>` or `<ElementTree>`.
-    Return None for an object of another library. Raise InputError if the object cannot be written.
+    Raise InputError if the object cannot be written.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"

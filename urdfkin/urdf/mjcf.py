@@ -385,7 +385,6 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
 
 
 def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
-    """Yield a remark if the hinge limits of a file in degrees are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
     if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:

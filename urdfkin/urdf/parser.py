@@ -430,13 +430,12 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 class NumberReader:
     """Read numbers from attributes, and report mistakes.
 
-    The rule `bad_number` reports an invalid number. The rule `bad_vector` reports a wrong count of numbers.
     `effect` is appended to the messages of both rules.
     """
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
-    bad_vector: Rule = BAD_VECTOR
+    bad_vector: Rule = BAD_VECTOR  # For a wrong count of numbers.
     effect: str = ""
 
     def read_scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:

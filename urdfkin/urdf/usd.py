@@ -190,9 +190,9 @@ def import_openusd() -> Any:
 def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage.
 
-    Check the references of each layer before OpenUSD follows the references. Raise InputError for a forbidden
-    reference, value clips, a Git LFS pointer, a layer that OpenUSD does not accept, and more than 1,000
-    layers. Raise SourceError for an unreadable file, and for more than `MAX_BYTES` bytes in total.
+    Raise InputError for a forbidden reference, value clips, a Git LFS pointer, a layer that OpenUSD does not
+    accept, and more than 1,000 layers. Raise SourceError for an unreadable file, and for more than
+    `MAX_BYTES` bytes in total.
     """
     allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0

@@ -9,8 +9,8 @@ A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new f
   change by at most `Fix.max_rotation` (rad).
 
 A line of the file can contain text that controls a terminal or a CI service, for example an escape sequence.
-A printed patch must escape this text, but `git apply` refuses escaped lines. Therefore, urdfkin then writes a
-git binary patch, and a comment with the escaped lines before the binary patch.
+urdfkin escapes this text, but `git apply` refuses escaped lines. Therefore, if a line must be escaped,
+urdfkin writes a git binary patch, and before the patch a comment that shows the escaped lines.
 """
 
 from __future__ import annotations
@@ -43,16 +43,11 @@ MAX_AXIS_TILT = Fraction(1, 2**52)
 
 @dataclass(frozen=True, slots=True)
 class FixResult:
-    """The text of a file after the fixes.
-
-    Attributes:
-        unfixed_reasons: Maps the code of a rule to the reason why `fix_text` did not fix findings with this
-            code.
-    """
+    """The text of a file after the fixes."""
 
     text: UrdfText
     fixed_findings: tuple[Finding, ...]
-    unfixed_reasons: dict[str, str]
+    unfixed_reasons: dict[str, str]  # By the code of the findings.
 
 
 def fix_text(
@@ -170,10 +165,7 @@ _PATCH_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def make_patch(file: str, before: bytes, after: bytes, escape: Callable[[str], str]) -> str:
-    """Return the patch of one UTF-8 file, or an empty text if `before` and `after` are equal.
-
-    `escape` escapes the control characters of a text.
-    """
+    """Return the patch of one UTF-8 file; `escape` escapes the control characters of a text."""
     if before == after:
         return ""
     name = _relative_path(file)

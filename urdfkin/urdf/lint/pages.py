@@ -54,7 +54,6 @@ class Page:
     Attributes:
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
             example begins with a joint or a comment, the links `base` and `tip` must be added.
-        correction: The corrected example.
         other_readers: The behaviour of other readers of the format for the example. For URDF, these readers
             are Pinocchio (urdfdom) and yourdfpy.
     """

@@ -91,15 +91,14 @@ def check(
 class Examination:
     """The result of a check; `robot` is None if the text is not a URDF.
 
-    `data` has no byte order mark, and findings state positions in `data`. `silenced_findings` contains
-    each silenced finding with the reason in the comment.
+    `data` has no byte order mark, and findings state positions in `data`.
     """
 
     text: UrdfText
     data: bytes
     robot: RobotRecord | None
     findings: tuple[Finding, ...]
-    silenced_findings: tuple[tuple[Finding, str], ...]
+    silenced_findings: tuple[tuple[Finding, str], ...]  # Each with the reason in the comment.
 
 
 def examine(

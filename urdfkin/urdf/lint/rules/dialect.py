@@ -253,7 +253,6 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
 
 
 def walk_outside_extensions(element: Element) -> Iterator[Element]:
-    """Yield an element and its descendants, except extension elements and their content."""
     stack = [element]
     while stack:
         element = stack.pop()
@@ -390,7 +389,6 @@ MAX_NAME_LENGTH = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
-    """Report names that are reserved, easily confused, or troublesome for other programs."""
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
@@ -472,7 +470,6 @@ _CODE_SEPARATOR = re.compile(r"[,\s]+")
 
 
 def apply_comments(report: Reporter, code_by_name: Mapping[str, str]) -> None:
-    """Apply the comments that silence findings, and report invalid comments."""
     comment_index = CommentIndex()
     for comment in report.comments:
         if (ignore := _read_comment(report, comment, code_by_name)) is not None:

@@ -508,7 +508,7 @@ SUSPICIOUS_LENGTH = 100.0
 #: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
-#: A whole number is probably in degrees if `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
+#: A whole-number limit is probably in degrees if `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
 #: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
