@@ -44,10 +44,10 @@ class CatalogueEntry:
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. If False, urdfkin ignores all
             mimic rules by default.
-        mimic_problem: The reason why the mimic rules of the URDF are invalid; None if the rules are valid.
+        mimic_problem: The reason why the mimic rules are invalid, or None.
         poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0. In
             the pose `ready`, they have the middle of their limits if the limits exclude 0.
-        is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
+        is_bundled: Whether urdfkin contains the URDF. If False, example-robot-data contains the URDF.
     """
 
     name: str
@@ -122,12 +122,10 @@ def _read_catalogue(file: str, *, is_bundled: bool) -> dict[str, CatalogueEntry]
     return entries
 
 
-#: Environment variables with search paths for packages.
 PACKAGE_PATH_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _PACKAGE_NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: Schemes of addresses with a package name and a path.
 PACKAGE_SCHEMES = ("package://", "model://")
 
 
@@ -146,10 +144,7 @@ def find_package(
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
-    """Return the first folder of a package that `accepts` allows, or None.
-
-    The docstring of this module describes the search.
-    """
+    """Return the first folder of a package that `accepts` allows; see the docstring of this module."""
     if not name or name in (".", "..") or "\0" in name:
         return None
     found = filter(is_folder, _candidates(name, referring_file, environ))

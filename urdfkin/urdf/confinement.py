@@ -92,7 +92,7 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or a path below `root`. Below `root`, no name may begin with a dot."""
+    """Return whether `path` is `root`, or a path below `root` without hidden files and folders."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -129,7 +129,7 @@ def limit_process(seconds: int) -> None:
 def confine(is_allowed: Callable[[str], bool]) -> None:
     """Permit only harmless audit events and reads of allowed files, until this process ends.
 
-    `is_allowed` receives the path of a file or folder. Any other event raises RefusedError.
+    Any other event raises RefusedError.
     """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:

@@ -65,7 +65,7 @@ def _expand(
 def _replace_evaluation(path: Path, search_paths: Mapping[str, str], allowed_paths: AllowedPaths) -> None:
     """Make xacro call urdfkin's functions to evaluate expressions and to find packages.
 
-    Raise RefusedError if this version of xacro does not call urdfkin's function to evaluate expressions.
+    Raise RefusedError if this version of xacro still evaluates an expression itself.
     """
     import xacro
     import xacrodoc.packages
@@ -104,10 +104,7 @@ def _make_package_finder(
     path: Path, search_paths: Mapping[str, str], allowed_paths: AllowedPaths
 ) -> Callable[[str], str]:
     def is_allowed_or_package(folder: Path) -> bool:
-        """Return whether a folder is allowed or contains a package.xml.
-
-        For example, `$(find etc)` does not find /etc.
-        """
+        # Without this condition, `$(find etc)` would find /etc.
         return allowed_paths.allows(str(folder)) or (folder / "package.xml").is_file()
 
     def find_package_folder(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Define findings: problems in a URDF, each with a code, a position, the wrong text and a remedy.
+"""Findings: problems in a file, each with a code, a position, the wrong text and a remedy.
 
 Line and column numbers do not count a byte order mark.
 
@@ -52,10 +52,7 @@ _TAB_SPACES = "    "
 
 
 class ExcerptFormatter:
-    """Shows lines of a file and underlines the wrong text of findings.
-
-    `data` contains the bytes of the file without a byte order mark.
-    """
+    """Show lines of a file, and underline the wrong text of findings; `data` has no byte order mark."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
@@ -119,7 +116,7 @@ class Fix:
 def apply_fixes(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
     """Return the fixed bytes and the applied fixes, in file order.
 
-    A fix is skipped if it begins before the end of the previous applied fix. A byte order mark stays.
+    A fix that overlaps the previous applied fix is skipped. A byte order mark stays.
     """
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     taken, end = list[Fix](), 0
@@ -131,11 +128,11 @@ def apply_fixes(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
 
 
 class Severity(Enum):
-    """The severity of a finding.
+    """The severity of a finding: error, warning or note.
 
-    - Error: the file describes no robot, or different URDF readers build different robots from the file.
-    - Warning: legal content that is almost certainly a mistake, or that URDF readers interpret differently.
-    - Note: information.
+    With an error, the file describes no robot, exceeds a limit, or gives different robots in different
+    readers. A warning is about legal content that is probably a mistake, or that readers interpret
+    differently. A note is information.
     """
 
     ERROR = "error"
@@ -148,10 +145,9 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """Ways in which Pinocchio fails to read a file that conforms to the URDF specification.
+    """Pinocchio's reading of a file that conforms to the URDF specification.
 
-    - `REFUSES`: Pinocchio refuses the file.
-    - `DIFFERS`: Pinocchio deviates from the URDF specification.
+    Pinocchio either refuses the file (`REFUSES`), or deviates from the specification (`DIFFERS`).
     """
 
     REFUSES = "refuses"
@@ -172,9 +168,11 @@ class Finding:
             with ` (expanded)`.
         line: Line number, from 1.
         column: Column number in characters, from 1.
-        element: The tag of the element with the problem, such as `joint` in URDF or `prim` in USD. In URDF,
-            it is usually a child of `<robot>`. None for the whole file.
-        name: The name of the element with the problem, or None. In USD, the path of the prim.
+        element: The tag of the element with the problem; None for the whole file. In URDF, the element is
+            usually a child of `<robot>`. In MJCF, `equality` means a constraint inside `<equality>`. `joint`
+            also means `<freejoint>`, and `flex` also means `<flexcomp>`. In USD, the value is `prim`.
+        name: The name of the element with the problem, or None. In MJCF, urdfkin may name an element without
+            a name by its index, such as `joint3` or `0`. In USD, the value is the path of the prim.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
         other_lines: Line numbers of more findings with the same code. This object also represents them.
@@ -231,7 +229,6 @@ class Finding:
 
     @property
     def _other_lines_text(self) -> str:
-        """Text about the line numbers in `other_lines`, for example "also on lines 3, 7"."""
         others = tuple(sorted(set(self.other_lines) - {self.line}))
         if len(others) == len(self.other_lines):
             return f"also on {_line_numbers_text(others)}"
@@ -350,8 +347,9 @@ class Rule:
 
     Attributes:
         id: The code of the findings: `URDF`, `MJCF` or `USD`, and three digits. A code is never reused. The
-            first digit of a URDF code is the topic. 1: text and XML. 2: elements and attributes. 3: numbers.
-            4: names and structure. 5: joints. 6: probable mistakes. 7: inertials, geometry and materials.
+            first digit of a URDF code is the topic: text and XML (1), elements and attributes (2), numbers
+            (3), names and structure (4), joints (5), probable mistakes (6), or inertials, geometry and
+            materials (7).
     """
 
     id: str
@@ -380,12 +378,12 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class IgnoreComment:
-    """A comment that silences findings; `used_codes` has the codes of the silenced findings."""
+    """A comment that silences findings."""
 
     comment: Comment
     codes: tuple[str, ...]
     reason: str
-    used_codes: set[str] = field(default_factory=set)
+    used_codes: set[str] = field(default_factory=set)  # Codes of the silenced findings.
 
 
 @dataclass(slots=True)
@@ -409,7 +407,7 @@ class CommentIndex:
             self._comment_by_key.setdefault((*place, code), ignore)
 
     def find_reason(self, code: str, line: int, element: Element | None) -> str | None:
-        """Return the reason of the nearest comment that silences a finding, or None."""
+        """Return the reason of the nearest comment that silences a finding, and mark the code as used."""
         places = [("line", line)]
         while element is not None:
             places.append(("element", id(element)))
@@ -428,8 +426,7 @@ MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
 #: With `fold`, one finding represents `MIN_FOLDED` or more warnings or notes with one code.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: The codes URDF7xx refer to inertials, shapes, meshes and materials.
-#: Kinematics does not use these elements.
+#: These codes are about inertials, shapes and materials, which kinematics does not use.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
 #: With `fold`, the maximum number of errors with the same code that are reported separately.
@@ -442,16 +439,12 @@ MAX_COMPLETE_FINDINGS = 10_000
 
 @dataclass(slots=True)
 class _FindingGroup:
-    """Findings of one code and severity.
-
-    Attributes:
-        weighted_findings: At most `MAX_COMPLETE_FINDINGS` pairs (finding, weight). `weight` is an argument of
-            `Reporter.add`.
-        further_lines: Line numbers of all further findings.
-    """
+    """Findings of one code and severity."""
 
     severity: Severity
+    #: At most `MAX_COMPLETE_FINDINGS` pairs (finding, weight).
     weighted_findings: list[tuple[Finding, float]] = field(default_factory=list)
+    #: Line numbers of all further findings.
     further_lines: array[int] = field(default_factory=lambda: array("q"))
 
 
@@ -525,10 +518,7 @@ class Reporter:
             self.silenced_findings.append((finding, reason))
 
     def silence(self, comment_index: CommentIndex) -> None:
-        """Silence all warnings and notes that the file's comments name, also those added after this call.
-
-        An example of such a comment is `<!-- urdfkin: ignore[URDF503] the reason -->`.
-        """
+        """Silence all warnings and notes that the file's comments name, also those added after this call."""
         self.comment_index = comment_index
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
@@ -562,7 +552,7 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings, sorted by line; omit findings for which `is_reported` returns False.
 
-        `is_reported` is called once for each finding in `_FindingGroup.weighted_findings`, in file order.
+        Call `is_reported` once for each complete finding, in file order: the function may count findings.
         """
         pairs = [pair for group in self._groups.values() for pair in group.weighted_findings]
         if is_reported is not None:
@@ -581,14 +571,13 @@ class Reporter:
     def has_replaced_characters(self) -> bool:
         """Whether an attribute value may contain a tab, a line end or a reference such as `&amp;`.
 
-        XML parsers replace these characters. The result can also be True for similar text outside tags.
+        XML parsers replace these characters.
         """
         if self._replaced_characters is None:
             self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
         return self._replaced_characters
 
     def raw_value(self, element: Element, attribute: str) -> str | None:
-        """Return an attribute value as written in the file."""
         span = self._spans(element).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
@@ -612,10 +601,7 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), max_rotation)
 
     def make_removal_fix(self, element: Element, *attributes: str) -> Fix | None:
-        """Return the fix that removes attributes and the white space before them.
-
-        Return None if the element has none of these attributes.
-        """
+        """Return the fix that removes attributes and the white space before each attribute."""
         existing = [span for name in attributes if (span := self._spans(element).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         edits = tuple(Edit(start_of_blanks(self.data, start), end) for start, end in spans)
@@ -680,7 +666,7 @@ def _sort_key(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
-    """Return the findings that are printed. The last one lists the lines of the findings left out."""
+    """Return the findings to report. The last finding lists the lines of the findings left out."""
     group.weighted_findings.sort(key=lambda pair: _sort_key(pair[0]))
     findings = [finding for finding, _ in group.weighted_findings]
     into_one = fold and group.severity is not Severity.ERROR

@@ -2,9 +2,8 @@
 
 Objects of ElementTree, lxml and yourdfpy become URDF text. A Model of Pinocchio becomes a kinematic tree.
 
-urdfkin recognizes an object of yourdfpy or Pinocchio by the module names of its class and base classes. An
-object with the attributes `tag`, `attrib` and `iter` counts as an element of ElementTree or lxml. Therefore
-urdfkin does not import yourdfpy, lxml or Pinocchio to recognize an object.
+urdfkin recognizes an object by the module names of its class and base classes, or by the attributes `tag`,
+`attrib` and `iter` of an element. Therefore, urdfkin does not import a library to recognize its objects.
 """
 
 from __future__ import annotations
@@ -52,10 +51,9 @@ class XmlTree(Protocol):
 
 
 def convert_to_urdf(source: Any) -> tuple[str, str] | None:
-    """Convert an object of yourdfpy, ElementTree or lxml to URDF text.
+    """Return the URDF text of an object and a name for messages; None for an object of another library.
 
-    Return the URDF text, and the name that messages use for the object: `<yourdfpy>` or `<ElementTree>`.
-    Return None for an object of another library. Raise InputError if the object cannot be written.
+    Raise InputError if the object cannot be written.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"
@@ -154,7 +152,7 @@ _KIND_BY_CLASS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: Limits above this number are treated as infinite. Pinocchio stores a missing limit as the largest double.
+#: Larger limits are treated as infinite, because Pinocchio stores a missing limit as the largest double.
 _INFINITE_LIMIT = 1e300
 
 
@@ -163,8 +161,8 @@ class ConvertedModel:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: Maps the name of a link to the index of a Pinocchio joint. Link and joint have the same frame.
-        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame.
+        joints: Index of the Pinocchio joint that has the same frame, by link name.
+        frames: Index of the Pinocchio frame, by link name, for the links that are not in `joints`.
     """
 
     tree: KinematicTree
@@ -200,9 +198,9 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: Maps the index of a joint to the name of the link that the joint moves.
+        #: Name of the link that a joint moves, by the index of the joint.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: Maps the index of a converted frame to the name of its link.
+        #: Name of the link, by the index of the converted frame.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 

@@ -43,13 +43,11 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import expand_home, read_start
 from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
-#: Limit (m) that replaces a missing limit of a prismatic joint.
-#: URDF requires limits.
+#: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
 FALLBACK_PRISMATIC_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
-#: Number of bytes that are searched for the root element.
 _SEARCHED_BYTES = 65_536
 
 
@@ -60,7 +58,7 @@ class MjcfRemark:
     Attributes:
         where: The tag and the name of the element, or the tag alone; None for the whole file.
         moves: Whether the reported part of the file affects the motion of the links.
-        remedy: The remedy if the file probably contains a mistake, otherwise None.
+        remedy: None, unless the file probably contains a mistake.
     """
 
     what: str
@@ -79,11 +77,9 @@ class Mjcf:
             set `fusestatic`.
         frames: For each link, the word "body" or "site", and the index of this body or site in `model`.
         qpos_index: Index in MuJoCo's qpos of each moving joint, including mimic joints.
-        mimic_equalities: Maps the index of a MuJoCo equality to the name of a mimic joint. The equality is
-            the mimic rule of this joint.
+        mimic_equalities: Name of the mimic joint, by the index of the equality with the mimic rule.
         other_equalities: Indices of the active joint equalities that are not mimic rules of the tree.
         with_shapes: Whether `model` contains the shapes and inertias of the file.
-        aligns_free_bodies: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
     """
 
     tree: KinematicTree
@@ -98,10 +94,7 @@ class Mjcf:
     aligns_free_bodies: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's qpos for urdfkin's q (n, nq).
-
-        qpos has the shape (n, `model.nq`), and also contains the values of mimic joints.
-        """
+        """Return MuJoCo's qpos (n, `model.nq`), with the values of mimic joints, for urdfkin's q (n, nq)."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.qpos_index:
@@ -118,7 +111,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        `fused_model` computes the placements of its frames, and `model` computes all other placements.
+        If `fused_model` is not None, it computes the frames that it contains; `model` computes the others.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -157,10 +150,9 @@ class Mjcf:
         return self._make_frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def hinge_angle_sums(self, q: FloatArray) -> FloatArray:
-        """Return the sum of |q| + |ref| (rad) over the hinges of each frame, shape (n, frames).
+        """Return the sum (n, frames) of |q| + |ref| (rad) over the hinges between the world and each frame.
 
-        The hinges of a frame are the hinges between the world and the frame. A hinge is omitted if its
-        reference value `ref` is zero. `mjcf_placement_bound` uses this sum.
+        A hinge is omitted if its reference value `ref` is zero.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -178,10 +170,9 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _make_frame_values(self, body_values: FloatArray, site_values: FloatArray) -> FloatArray:
-        """Return one number for each sample and frame, shape (n, frames).
+        """Return values (n, frames) from `body_values` (n, bodies) and `site_values` (sites,).
 
-        `body_values` has the shape (n, bodies), and `site_values` has the shape (sites,). The value of a site
-        is the sum of the site's own value and the value of its body.
+        The value of a site is the sum of the site's own value and the value of its body.
         """
         columns = [
             body_values[:, i]
@@ -255,7 +246,7 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>.
 
-    The root element of a file must be in the first 65,536 bytes. An unreadable file gives False.
+    The root element of a file must be in the first 65,536 bytes.
     """
     if isinstance(source, bytes):
         return _ROOT_ELEMENT.match(source.decode("utf-8-sig", "replace")) is not None
@@ -360,7 +351,6 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-#: Kinds of MuJoCo elements that kinematics does not use.
 #: Keys are attributes of `MjSpec`; values are the singulars in messages.
 _UNUSED_ELEMENTS = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
@@ -395,7 +385,6 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
 
 
 def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
-    """Yield a remark if the hinge limits of a file in degrees are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
     if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
@@ -417,8 +406,7 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # With `align`, MuJoCo moves the frame of a free body to the body's inertial frame.
-        # `align` is switched off, because the loop below replaces all inertias by placeholders.
+        # `align` would use the inertial frame, but the loop below replaces all inertias by placeholders.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -566,13 +554,9 @@ class _MjcfReader:
             yield name, resolve_rule(rules, name)
 
     def _read_rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the mimic joint and the mimic rule of equality `i`, or None.
+        """Return the mimic joint y and the mimic rule of equality `i`, or None.
 
-        The equality is a mimic rule if it is a linear relation of two joints x and y:
-
-        `y - y0 = c0 + c1 (x - x0)`
-
-        Here x0 and y0 are the reference values of the joints. The mimic joint is y.
+        The equality must have the form y - y0 = c0 + c1 (x - x0). Here x0 and y0 are reference values.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])

@@ -10,7 +10,6 @@ from urdfkin.system.lazy_import import install_command, installed_version
 
 
 def import_mujoco() -> Any:
-    """Return the module `mujoco`; raise InputError if MuJoCo is not installed."""
     try:
         import mujoco
     except ImportError:

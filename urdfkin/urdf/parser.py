@@ -59,7 +59,7 @@ XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16.
-#: UTF-32 comes first. Its byte order mark begins with the byte order mark of UTF-16.
+#: UTF-32 comes first, because its byte order mark begins with the byte order mark of UTF-16.
 _WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -141,10 +141,7 @@ def _check_declaration(report: Reporter, text: bytes, declared: str | None) -> b
 
 
 def _find_codec(name: str) -> str | None:
-    """Return Python's name of an encoding, in lower case.
-
-    All hyphens are removed, except in `utf-8`. Return None for an unknown encoding.
-    """
+    """Return Python's name of an encoding in lower case, without hyphens except in `utf-8`."""
     try:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
     except LookupError:
@@ -339,7 +336,6 @@ class _Builder:
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Stop if the declaration has brackets or refers to an external definition; warn otherwise."""
         self.has_content = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -398,7 +394,6 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: A message and a remedy (or None) for each error of expat.
 _TEXTS_BY_EXPAT_ERROR: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -435,13 +430,12 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 class NumberReader:
     """Read numbers from attributes, and report mistakes.
 
-    The rule `bad_number` reports an invalid number. The rule `bad_vector` reports a wrong count of numbers.
     `effect` is appended to the messages of both rules.
     """
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
-    bad_vector: Rule = BAD_VECTOR
+    bad_vector: Rule = BAD_VECTOR  # For a wrong count of numbers.
     effect: str = ""
 
     def read_scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
@@ -546,7 +540,7 @@ class NumberReader:
         )
 
 
-#: Tags that messages about invalid numbers omit. The messages contain the attribute's name.
+#: Tags that messages about invalid numbers omit.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
@@ -672,7 +666,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def read_name(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; an empty string if there is none. A missing name is reported."""
+    """Return the name of a link or joint; report a missing name and return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -706,10 +700,9 @@ class JointReader:
     def read_required(
         self, element: Element, attribute: str, example: str, *, number: bool = False
     ) -> str | None:
-        """Return the value of a required attribute, and report a missing attribute.
+        """Return a required attribute; report a missing or empty attribute and return None.
 
-        An empty value is also reported, except if `number` is True. Then `NumberReader` reports the value.
-        `example` shows the attribute in the remedy. Return None for a missing or empty value.
+        If `number` is True, an empty attribute is not reported, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):

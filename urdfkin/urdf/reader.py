@@ -105,12 +105,8 @@ def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return a rule for each mimic joint, by joint name. The mimicked joint of each rule is independent.
 
-    Example of a chain: z mimics y, and y mimics the independent joint x. The returned rule for z is:
-
-    `z = m2 (m1 x + b1) + b2`
-
-    urdfkin and Pinocchio combine the rules in the same order, from x to z. Therefore, the rounding errors are
-    equal.
+    urdfkin and Pinocchio combine the rules of a chain in the same order, beginning with the independent
+    joint. Therefore, the rounding errors are equal.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

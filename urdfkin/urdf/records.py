@@ -11,8 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 #: Maximum depth of nested elements in a URDF that Pinocchio reads.
-#: Pinocchio's XML parser is tinyxml2.
-#: tinyxml2 counts the document as level 1, and refuses level 500.
+#: Pinocchio's parser tinyxml2 counts the document as level 1, and refuses level 500.
 ORACLE_DEPTH = 498
 
 
@@ -68,7 +67,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child. To save memory, an element without children has no list of children."""
+        # To save memory, an element without children has no list of children.
         if isinstance(self.children, list):
             self.children.append(child)
         else:

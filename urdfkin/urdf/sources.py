@@ -26,8 +26,7 @@ class Origin:
     """The arguments of `load`, and properties of the source.
 
     Attributes:
-        source: A path, a catalogue name, or `-` for standard input. If the source has no name, the value is
-            a word in angle brackets, such as `<text>`, `<bytes>` or `<table>`.
+        source: A path, a catalogue name, `-` for standard input, or a word such as `<text>` or `<table>`.
         table: Whether the robot was created from a Denavit-Hartenberg table or a product of exponentials.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are omitted.
@@ -52,10 +51,7 @@ class Origin:
 
     @property
     def source_argument(self) -> str:
-        """The argument with which `load` can read the source again.
-
-        If the source has no name, the argument is `-`, standard input.
-        """
+        """The argument of `load` for the source; `-`, standard input, if the source has no name."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -129,8 +125,7 @@ class UrdfText:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name with which the URDF can be read again. A source without a path or name has
-            the value `-` or a word in angle brackets, such as `<text>`, `<bytes>` or `<file>`.
+        source: A path, a catalogue name, `-` for standard input, or a word such as `<text>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; empty for other sources.
     """
 
@@ -149,9 +144,8 @@ def read_source(
 ) -> UrdfText:
     """Read a URDF from any source.
 
-    Read at most `max_bytes` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
-    `max_bytes` + 1 characters of an open text file. If `max_bytes` + 1 are read, the source is too
-    long.
+    Read at most `max_bytes` + 1 bytes (or characters of an open text file) of a URDF, so that the caller can
+    recognize a longer source.
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
 
@@ -237,7 +231,6 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
 
 
 def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
-    """Return the file of a `package://` or `model://` address; raise SourceError for an unknown package."""
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
@@ -275,10 +268,7 @@ def unambiguous_path(path: Path) -> str:
 
 
 def find_entry(name: str) -> CatalogueEntry | None:
-    """Return the catalogue entry of a name, or None.
-
-    A text with a dot or a path separator is a path, not a name.
-    """
+    """Return the catalogue entry of a name; a text with a dot or a path separator is a path, not a name."""
     return None if "." in name or os.sep in name else catalogue().get(name)
 
 

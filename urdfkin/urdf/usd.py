@@ -57,7 +57,6 @@ from urdfkin.urdf.mjcf import (
 )
 from urdfkin.urdf.sources import USD_SUFFIXES
 
-#: Maximum number of layers of a stage.
 _MAX_LAYERS = 1_000
 #: A USD limit of infinity or the largest single precision number means no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
@@ -70,8 +69,8 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: Rounding changes the length of a stored quaternion by at most u.
 #: Therefore, the cosine between two axes changes by at most 4 u.
 _MAX_SHEAR = 14.0
-#: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
-#: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
+#: A revolute joint with limits up to this angle (degrees) hardly moves.
+#: USD303 (limits that are probably in radians) omits such a joint.
 _NEGLIGIBLE_LIMIT_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
@@ -84,8 +83,7 @@ _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of joint types that a kinematic tree cannot represent.
 #: OpenUSD recognizes gear joints and rack-and-pinion joints only with a plugin.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: USD attributes with the nonlinear coefficients of MuJoCo's joint equality.
-#: URDF mimic rules are linear.
+#: Nonlinear coefficients of MuJoCo's joint equality; mimic rules are linear.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _MOTION_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -123,8 +121,7 @@ class UsdJoint:
         p0: (3,) origin of the joint frame in the first body, m.
         quat0: (4,) unit quaternion of the joint frame in the first body, scalar last.
         limits: Lower and upper limit, rad or m.
-        length_sum: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`. Error
-            bounds depend on this sum.
+        length_sum: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`.
     """
 
     directions: str
@@ -193,9 +190,9 @@ def import_openusd() -> Any:
 def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage.
 
-    Check the references of each layer before OpenUSD follows the references. Raise InputError for a forbidden
-    reference, value clips, a Git LFS pointer, a layer that OpenUSD does not accept, and more than 1,000
-    layers. Raise SourceError for an unreadable file, and for more than `MAX_BYTES` bytes in total.
+    Raise InputError for a forbidden reference, value clips, a Git LFS pointer, a layer that OpenUSD does not
+    accept, and more than 1,000 layers. Raise SourceError for an unreadable file, and for more than
+    `MAX_BYTES` bytes in total.
     """
     allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
@@ -232,10 +229,7 @@ def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Raise InputError if a prim has value clips.
-
-    OpenUSD does not list the files of value clips among the dependencies of the layer.
-    """
+    """Refuse value clips, because OpenUSD does not list their files among the layer's dependencies."""
     found: list[str] = []
 
     def find_clips(path: Any) -> None:
@@ -313,11 +307,10 @@ def read_usd(
 
 
 def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants of a stage, expand its instances, and return the paths of the expanded instances.
+    """Select variants of a stage, and return the paths of the instances that were expanded.
 
-    OpenUSD cannot select a variant inside an instance. If a prim inside an instance has the variant set, the
-    instance is expanded to an ordinary prim. All changes are in the session layer, which OpenUSD does not
-    save.
+    OpenUSD cannot select a variant inside an instance, so the instance is expanded to an ordinary prim. All
+    changes are in the session layer, which OpenUSD does not save.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     expanded_instances = set[str]()
@@ -365,8 +358,7 @@ class _JointPrim:
         name: At first the name of the prim; later the unique name of the joint in the tree.
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in the two bodies.
-        rounding: Bounds on the errors of the joint frame's position (m) and orientation (rad). The cause of
-            the errors is rounding to single precision.
+        rounding: Bounds on the joint frame's single-precision errors in position (m) and orientation (rad).
     """
 
     prim: Any
@@ -390,16 +382,9 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Reader of one stage.
-
-    Attributes:
-        source: Name of the stage in messages.
-        expanded_instances: Paths of the instances that `_select_variants` expanded.
-    """
-
     pxr: Any
     stage: Any
-    source: str
+    source: str  # Name of the stage in messages.
     expanded_instances: frozenset[str]
     remarks: list[UsdRemark] = field(default_factory=list)
     _bodies: dict[str, _Body] = field(default_factory=dict)
@@ -481,11 +466,7 @@ class _StageReader:
         return prims
 
     def _read_value(self, prim: Any, name: str) -> Any:
-        """Return the value of an attribute.
-
-        If the value is missing or blocked, return the default of the attribute. Return None if
-        the attribute does not exist, or has neither value nor default.
-        """
+        """Return the value of an attribute; for a missing or blocked value, return the default or None."""
         attribute = prim.GetAttribute(name)
         if not attribute:
             return None
@@ -660,14 +641,11 @@ class _StageReader:
     def _read_joint_frame(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return four values for body i of a joint.
+        """Return body i of a joint, the pose of the joint frame in the body, a length sum and error bounds.
 
-        - The path of the body, or None for the world.
-        - The pose of the joint frame relative to the body (m).
-        - The sum of the lengths (m) of all vectors that are added to compute the position of the joint frame.
-        - Bounds on the rounding errors of the joint frame's position (m) and orientation (rad).
-
-        Return None if the body does not exist or is in a prototype of a point instancer.
+        The body None is the world. `UsdJoint` defines the length sum (m). The error bounds are for the
+        position (m) and the orientation (rad). Return None for a body that does not exist or is in a point
+        instancer.
         """
         p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
         quaternion = self._read_value(prim, f"physics:localRot{i}")
@@ -700,11 +678,11 @@ class _StageReader:
     def _rounding_of_transforms(
         self, path: str, body: str | None, translation_length_sum: float
     ) -> tuple[float, float]:
-        """Return bounds on the errors of a prim's position (m) and orientation (rad) relative to a body.
+        """Return bounds on a prim's single-precision errors in position (m) and orientation (rad).
 
-        The cause of the errors is rounding to single precision. The body None is the world. An error in the
-        rotation of a prim also displaces all prims below the prim. `translation_length_sum` is the sum of the
-        lengths (m) of the translations from the body to the prim. Transforms in half precision are ignored.
+        The pose is relative to `body`. `translation_length_sum` is the sum of the lengths (m) of the
+        translations from the body to the prim. An error in the rotation of a prim also displaces all prims
+        below the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -747,7 +725,7 @@ class _StageReader:
     def _read_general_motion(
         self, prim: Any, path: str
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the result of `_read_motion` for a `PhysicsJoint`, which has limits for six directions."""
+        """Return the motion of a `PhysicsJoint`, which can have limits for six directions."""
         limits: dict[str, tuple[float, float]] = {}
         for direction in _MOTION_DIRECTIONS:
             low, high = _NO_LIMITS
@@ -774,15 +752,10 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free_directions)
 
     def _read_limit(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`.
-
-        Raise InputError if a layer blocks the value. USD readers use different values for a blocked limit.
-        """
+        """Return a limit of a `PhysicsJoint`; refuse None, which USD readers interpret differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            message = (
-                "the value of a joint limit is blocked (None), and USD readers then use different limits"
-            )
+            message = "the value of a joint limit is None, which USD readers interpret differently"
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)
@@ -806,11 +779,10 @@ class _StageReader:
     # -- articulations -------------------------------------------------------------------------------
 
     def _find_articulations(self) -> list[_Articulation]:
-        """Return the groups of connected bodies; report and ignore joints between articulations."""
+        # The groups of connected bodies are found by union-find.
         representative: dict[str, str] = {path: path for path in self._bodies}
 
         def find_representative(path: str) -> str:
-            """Return the body that represents a group of bodies (union-find)."""
             while representative[path] != path:
                 representative[path] = representative[representative[path]]
                 path = representative[path]
@@ -865,10 +837,7 @@ class _StageReader:
     def _choose_articulation(
         self, articulations: list[_Articulation], articulation: str | None
     ) -> _Articulation:
-        """Return the articulation with the path or name `articulation`.
-
-        If `articulation` is the path of an ancestor, join all articulations below the ancestor.
-        """
+        """Return the named articulation; for the path of an ancestor, join all articulations below it."""
         if not articulations:
             message = "this stage has no joint between bodies"
             remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"
@@ -1115,10 +1084,7 @@ class _StageReader:
             yield by_path[path].name, replace(rule, mimicked_joint=by_path[rule.mimicked_joint].name)
 
     def _read_mimic_rules(self, edge: _JointPrim) -> Iterator[Mimic]:
-        """Yield the mimic rules of a joint. The offsets are in rad or m.
-
-        `Mimic.mimicked_joint` contains the path of the mimicked joint's prim.
-        """
+        """Yield the mimic rules of a joint (offset in rad or m); `mimicked_joint` is the path of a prim."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:

@@ -79,7 +79,6 @@ def _write_limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
 
 
 def format_numbers(values: Iterable[float]) -> str:
-    """Return numbers as text, with enough digits to restore the same doubles."""
     return " ".join(repr(float(value)) for value in values)
 
 

@@ -78,11 +78,9 @@ def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> P
     return folder / name
 
 
-#: Maximum time of an expansion (s).
-#: A macro may call itself without end.
+#: Maximum time of an expansion (s), because a macro may call itself without end.
 EXPANSION_TIMEOUT = 60.0
 
-#: Maximum size of the expanded URDF in bytes.
 MAX_EXPANDED_BYTES = 100_000_000
 
 

@@ -8,10 +8,9 @@ A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new f
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
   change by at most `Fix.max_rotation` (rad).
 
-A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence. urdfkin escapes this text, but `git apply` refuses escaped
-lines. Therefore, urdfkin writes a git binary patch if a line must be escaped. A comment before the binary
-patch shows the escaped lines.
+A line of the file can contain text that controls a terminal or a CI service, for example an escape sequence.
+urdfkin escapes this text, but `git apply` refuses escaped lines. Therefore, if a line must be escaped,
+urdfkin writes a git binary patch, and before the patch a comment that shows the escaped lines.
 """
 
 from __future__ import annotations
@@ -35,8 +34,7 @@ from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, Robot
 from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file.
-#: The fixes of one pass do not overlap.
-#: Each pass fixes only findings with the same code, such as URDF303.
+#: One pass applies the fixes of one code, except overlapping fixes.
 MAX_PASSES = 100
 
 #: Rounding to doubles rotates a unit vector by at most this angle (rad).
@@ -45,16 +43,11 @@ MAX_AXIS_TILT = Fraction(1, 2**52)
 
 @dataclass(frozen=True, slots=True)
 class FixResult:
-    """The text of a file after the fixes.
-
-    Attributes:
-        unfixed_reasons: Maps the code of a rule to the reason why `fix_text` did not fix findings with this
-            code.
-    """
+    """The text of a file after the fixes."""
 
     text: UrdfText
     fixed_findings: tuple[Finding, ...]
-    unfixed_reasons: dict[str, str]
+    unfixed_reasons: dict[str, str]  # By the code of the findings.
 
 
 def fix_text(
@@ -112,10 +105,10 @@ def _find_objections(before: Examination, after: Examination, fixable: list[Find
 
 
 def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str, float]) -> Iterator[str]:
-    """Yield a message for each difference between two robots.
+    """Yield messages about differences between two robots, at most one for each joint.
 
-    The function compares the version, the links, and the joint values that URDF readers use. For each joint
-    name, `max_rotations` contains the largest permitted rotation (rad) of the joint origin.
+    The function compares the version, the links, and the joint values that URDF readers use. `max_rotations`
+    contains the largest permitted rotation (rad) of a joint origin, by joint name.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
@@ -166,18 +159,13 @@ def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
     return None if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
-#: Bytes per line of git's binary patch.
 _PATCH_BYTES_PER_LINE = 52
-#: First letters of the lines in git's binary patch.
-#: A letter encodes the number of bytes of the line.
+#: The first letter of a line in git's binary patch encodes the number of bytes of the line.
 _PATCH_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def make_patch(file: str, before: bytes, after: bytes, escape: Callable[[str], str]) -> str:
-    """Return the patch of one UTF-8 file, or an empty text if `before` and `after` are equal.
-
-    `escape` escapes the control characters of a text.
-    """
+    """Return the patch of one UTF-8 file; `escape` escapes the control characters of a text."""
     if before == after:
         return ""
     name = _relative_path(file)

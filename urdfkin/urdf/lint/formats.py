@@ -26,8 +26,7 @@ def as_sarif(
 ) -> str:
     """Return a SARIF document with all rules about URDF files, and a result for each finding.
 
-    Rules about MJCF and USD are included only if a finding has their code. Each pair in `silenced_findings`
-    is a finding and the reason in the comment. SARIF marks these findings with the entry `suppressions`.
+    Rules about MJCF and USD are included only if a finding has their code.
     """
     codes = {finding.code for finding in findings}
     rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
@@ -110,10 +109,7 @@ def format_summary(findings: Sequence[Finding], files: int) -> str:
 
 
 def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield a line for each code. The code with the most findings comes first.
-
-    The mark `[*]` means that `--fix` can fix at least one finding with this code.
-    """
+    """Yield a line for each code; `[*]` means that `--fix` can fix at least one finding with this code."""
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
@@ -131,10 +127,7 @@ def as_json(
     version: str,
     silenced_findings: Sequence[tuple[Finding, str]] = (),
 ) -> str:
-    """Return the findings as a JSON document.
-
-    Positions in a `fix` are byte indices. Byte 0 is the first byte after a byte order mark.
-    """
+    """Return a JSON document. A position in a `fix` counts the bytes after a byte order mark, from 0."""
     document = {
         "schema": "urdfkin-findings",
         "version": JSON_VERSION,

@@ -2,8 +2,8 @@
 
 The rules are defined in the parser and in the modules of `lint.rules`. Each module has a TOML file beside the
 module. For example, `joints.toml` belongs to `joints.py`. For each rule of the module, the file has one TOML
-table, such as [URDF502]. The table contains the texts of the rule's page. If an entry such as `correction`,
-`other_readers` or `question` is at the top of the file, the entry is the default for all pages.
+table, such as [URDF502]. The table contains the texts of the rule's page. An entry at the top of the file,
+such as `correction`, is the default for all pages.
 
 The table `parts` defines texts that replace `{name}` in examples. Each entry is a string, or a pair
 [text, times] for a repeated text. In a repeated text, `{i}` is the index of the repetition. Line breaks in
@@ -36,7 +36,6 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 }
 
 URDF_RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The rules about MJCF and USD files.
 MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule about URDF files. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
@@ -55,7 +54,6 @@ class Page:
     Attributes:
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
             example begins with a joint or a comment, the links `base` and `tip` must be added.
-        correction: The corrected example.
         other_readers: The behaviour of other readers of the format for the example. For URDF, these readers
             are Pinocchio (urdfdom) and yourdfpy.
     """
@@ -137,9 +135,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
-#: Maximum line length of a printed example.
 _MAX_EXAMPLE_WIDTH = 100
-#: Width of prose on a terminal, in characters.
 PROSE_WIDTH = 88
 
 

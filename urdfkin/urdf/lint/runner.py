@@ -1,4 +1,4 @@
-"""Run all rules on a URDF: rules about bytes, XML, elements, names, joints, numbers and links.
+"""Run all rules on a URDF.
 
 `urdfkin.load` builds the robot from the records that the rules have checked.
 """
@@ -91,15 +91,14 @@ def check(
 class Examination:
     """The result of a check; `robot` is None if the text is not a URDF.
 
-    `data` has no byte order mark, and findings state positions in `data`. `silenced_findings` contains
-    each silenced finding with the reason in the comment.
+    `data` has no byte order mark, and findings state positions in `data`.
     """
 
     text: UrdfText
     data: bytes
     robot: RobotRecord | None
     findings: tuple[Finding, ...]
-    silenced_findings: tuple[tuple[Finding, str], ...]
+    silenced_findings: tuple[tuple[Finding, str], ...]  # Each with the reason in the comment.
 
 
 def examine(
@@ -111,10 +110,9 @@ def examine(
     fold: bool = False,
     is_reported: Callable[[Finding], bool] | None = None,
 ) -> Examination:
-    """Check a text; the function `check` documents the arguments.
+    """Check a text; `check` documents the arguments.
 
-    `is_reported` returns False for a finding that must not be reported. The function removes these findings
-    before it combines findings with the same code.
+    A finding is removed if `is_reported` returns False. Then findings with the same code are combined.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic

@@ -57,9 +57,8 @@ def baseline_key(finding: Finding, file: str) -> BaselineKey:
 class Baseline:
     """Known findings, counted by key.
 
-    File names in the keys are relative to the folder `root`. `counts` contains the number of known findings
-    that the current run has not found yet. `match_count` is the number of known findings that the run has
-    found.
+    File names in the keys are relative to the folder `root`. `counts` contains only findings that the current
+    run has not found yet.
     """
 
     counts: Counter[BaselineKey]
@@ -75,7 +74,7 @@ class Baseline:
         return True
 
     def count_unmatched(self, files: Iterable[str]) -> int:
-        """Return the number of known findings in `files` that this run has not encountered."""
+        """Return the number of known findings in `files` that the run has not found."""
         checked = {relative_path(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -105,8 +104,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    If the file `path` contains an older baseline, the function also copies entries of the older baseline. The
-    function does not copy entries about a file in `files` or about a deleted file.
+    If the file `path` contains an older baseline, its entries are copied, except entries about a file in
+    `files` or about a deleted file.
     """
     counts = Counter(baseline_key(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -132,9 +131,7 @@ _TYPE_NAMES = {
     str: "a string",
 }
 
-#: Default patterns of robot files.
-#: Most .xacro files describe only a part of a robot.
-#: The patterns therefore exclude .xacro files.
+#: Default patterns of robot files, without .xacro: most .xacro files describe only a part of a robot.
 DEFAULT_INCLUDE = ("*.urdf",)
 
 
@@ -250,8 +247,8 @@ class FindingFilter:
     ) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        The returned function counts known findings. Therefore call the returned function exactly once for
-        each finding, in file order.
+        The function counts known findings. Therefore, call the function exactly once for each finding, in
+        file order.
         """
         codes = self.codes - self.settings.ignored_codes(text.label)
         known = [baseline for baseline in (self.baseline, older_findings) if baseline is not None]
@@ -277,12 +274,13 @@ class FindingFilter:
 def find_known_findings(
     text: UrdfText, version: CommitFiles, examine: Callable[[UrdfText], Examination]
 ) -> Baseline | None:
-    """Return the findings of the older version of a file. None means that all current findings are known.
+    """Return the findings of the older version of a file; None if all current findings are known.
 
-    All findings of an unchanged file are known, with two exceptions. First, a xacro file can include other
-    files. If a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed, all findings of the xacro file
-    are new. Second, a mesh file that exists in the older version may be missing now. If the URDF contains
-    the name of a file deleted since that version, all findings about missing meshes are new.
+    All findings of an unchanged file are known, with two exceptions:
+
+    - All findings of a xacro file are new if a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed.
+      The xacro file may include the changed file.
+    - All findings about missing meshes are new if the URDF contains the name of a file that was deleted.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:

@@ -25,11 +25,10 @@ NEGLIGIBLE_MASS = 1e-3
 
 #: No principal moment may be negative or exceed the sum of the other two.
 #: The tolerance of these checks is this number (m^2) times the mass.
-#: A body with a mass of 1 kg and a radius of gyration of 0.03 mm has such a moment.
+#: This number is the moment of a body of 1 kg with a radius of gyration of 0.03 mm.
 NEGLIGIBLE_MOMENT = 1e-9
 
-#: Relative rounding error of the moments of inertia in a file.
-#: Exporters write moments of inertia with few digits.
+#: Relative rounding error of the moments of inertia, which exporters write with few digits.
 _MOMENT_PRECISION = 1e-6
 
 _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -245,11 +244,7 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> None:
-    """Report missing meshes and packages.
-
-    `urdf_path` is the path of the URDF file. If `urdf_path` is None, only `package://` and `model://` meshes
-    are checked.
-    """
+    """Report missing meshes and packages; without `urdf_path`, check only `package://` and `model://`."""
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
     for mesh in _find_meshes(root):

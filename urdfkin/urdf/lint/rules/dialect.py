@@ -95,7 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element, and the name of an attribute. If the name is None, the pair stands for the element.
+#: An element, and the name of an attribute or None for the element itself.
 _ElementOrAttribute = tuple[Element, str | None]
 
 
@@ -146,7 +146,7 @@ UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extension elements may contain anything, even `<joint>` and `<link>`.
+#: These elements may contain anything, even `<joint>` and `<link>`.
 EXTENSION_ELEMENTS = frozenset(
     {"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"}
 )
@@ -253,7 +253,6 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
 
 
 def walk_outside_extensions(element: Element) -> Iterator[Element]:
-    """Yield an element and its descendants, except extension elements and their content."""
     stack = [element]
     while stack:
         element = stack.pop()
@@ -371,7 +370,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribu
 
 
 def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix, with the name of its attribute or with None for the tag's prefix."""
+    """Yield each namespace prefix, and the name of its attribute or None for the tag."""
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
@@ -385,13 +384,11 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 LINE_BREAK_IN_NAME = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Maximum number of characters of a name; URDF405 reports longer names.
-#: Longer names break tables and file paths.
+#: URDF405 reports longer names, because they break tables and file paths.
 MAX_NAME_LENGTH = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
-    """Report names that are reserved, easily confused, or troublesome for other programs."""
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
@@ -473,7 +470,6 @@ _CODE_SEPARATOR = re.compile(r"[,\s]+")
 
 
 def apply_comments(report: Reporter, code_by_name: Mapping[str, str]) -> None:
-    """Apply the comments that silence findings, and report invalid comments."""
     comment_index = CommentIndex()
     for comment in report.comments:
         if (ignore := _read_comment(report, comment, code_by_name)) is not None:
@@ -512,11 +508,7 @@ def _read_comment(
 
 
 def check_unused_comments(report: Reporter) -> None:
-    """Report unused codes in comments such as `<!-- urdfkin: ignore[URDF503] the reason -->`.
-
-    A code is unused if the comment silences no finding with this code. Call this function after all
-    other rules.
-    """
+    """Report codes in comments that silence no finding. Call this function after all other rules."""
     for ignore in report.comment_index.comments:
         for code in ignore.codes:
             if code not in ignore.used_codes:

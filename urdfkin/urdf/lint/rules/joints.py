@@ -61,7 +61,7 @@ def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _check_loops_and_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Report loops, and links with several parent joints. Return True if there are none."""
+    """Report loops and links with several parents. Return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
@@ -138,7 +138,7 @@ PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
 #: If an axis length differs from 1 by less than this number, the finding is a note.
-#: Rounding the axis to few digits causes such small differences.
+#: The cause is probably that the axis is rounded to few digits.
 NOTE_LENGTH_ERROR = 2e-4
 
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
@@ -151,7 +151,7 @@ _Z_AXIS_TOLERANCE = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: If the angle (rad) between an axis and a coordinate axis is at most this number, it is not reported.
+#: An angle (rad) up to this number between an axis and a coordinate axis is not reported.
 #: The error bounds in `verify.bounds` cover this angle.
 _NEGLIGIBLE_TILT = 2.0**-52
 
@@ -233,7 +233,7 @@ def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
 
-    Return None if the angle is at most `_NEGLIGIBLE_TILT`.
+    Return None if Pinocchio uses `axis` itself, or if the angle is at most `_NEGLIGIBLE_TILT`.
     """
     if axis is None:
         return None
@@ -331,8 +331,7 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: The limits of a mimic joint can exclude part of the mimicked joint's range.
-#: URDF527 reports an excluded part that is larger than this fraction of the range.
+#: URDF527 reports limits that exclude more than this fraction of the mimicked joint's range.
 #: Limits with few digits often exclude a smaller part.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
@@ -436,8 +435,8 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # `restrict_range` subtracts a rounding error at both ends of the range, so a range of one value
-        # becomes empty. Therefore, each end of `moving` is tested alone.
+        # `restrict_range` subtracts a rounding error at both ends, so a range of one value becomes empty.
+        # Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -455,10 +454,7 @@ class _MimicChecker:
         )
 
     def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the last joint of the chain.
-
-        The last joint is None if the joint does not exist, or if the chain contains a cycle.
-        """
+        """Return the combined rule of a mimic chain, and its last joint (None if missing, or in a cycle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.mimicked_joint, mimic.multiplier, mimic.offset)
@@ -473,10 +469,7 @@ class _MimicChecker:
 
 
 def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
-
-    Return None for other joint types, for a missing `<limit>`, and for lower >= upper.
-    """
+    """Return the limits of a revolute or prismatic joint, or +- pi for a continuous joint; otherwise None."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -515,13 +508,11 @@ SUSPICIOUS_LENGTH = 100.0
 #: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
-#: A limit is probably in degrees if it is a whole number, and
-#: `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
+#: A whole-number limit is probably in degrees if `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
 #: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: An angle of 1.57 instead of pi/2 displaces the links after the joint.
-#: The finding is a warning if the displacement exceeds this length (m).
+#: A rounded angle is a warning if the rounding moves the links after the joint by more than this length (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
 #: Maximum difference (rad) of an angle that counts as an exact k * pi.
@@ -534,7 +525,7 @@ _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 
 
 def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
-    """Report legal values that are probably mistakes. `is_tree` is True if the joints form a tree."""
+    """Report legal values that are probably mistakes."""
     reach = _reach(robot) if is_tree else {}
     slides = any(joint.kind in ("prismatic", "planar", "floating") for joint in robot.joints)
     condition = " if all translations are 0" if slides else ""
@@ -580,8 +571,7 @@ def _check_rounded(
 ) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
-    The message quotes the angle with the largest rounding error. The distance to the links below is at most
-    `reach` (m) under the condition `condition`, a text for the message.
+    `reach` (m) bounds the distance to the links below; `condition` is the condition of this bound as text.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)

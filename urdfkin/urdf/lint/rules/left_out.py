@@ -39,7 +39,6 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: urdfkin searches for the elements of findings in this number of bytes from the beginning of a file.
 _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
@@ -115,10 +114,7 @@ def _make_finding(
 def _find_positions(
     data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]
 ) -> _Positions:
-    """Return line, column and width of each element in the first `_MAX_SEARCHED_BYTES` bytes.
-
-    If several elements have the same tag and name, the function returns the position of the first element.
-    """
+    """Return the position of the first element with each tag and name."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_MAX_SEARCHED_BYTES]):
         found.setdefault((element, name), (first, last))
