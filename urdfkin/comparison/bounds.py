@@ -217,7 +217,7 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize each frame's distance, from the points `z` (frames, starting points, variables)."""
+        """Maximize each frame's distance, starting at `z` (frames, starting points, variables)."""
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
@@ -244,7 +244,7 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (frames, starting points, trials), m, of frame k at `z[k]`.
+        """Return the distance (m) of each frame k at the values `z[k]` of the variables.
 
         The shape of `z` is (frames, starting points, trials, variables).
         """
@@ -415,7 +415,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Count the halvings of single h_i until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
+    """Count the halvings of box widths until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

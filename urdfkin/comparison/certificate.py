@@ -209,8 +209,8 @@ class SameCertificate(Header):
     tools: Annotated[
         list[ToolEntry],
         doc(
-            "Matched links with different poses on their rigid bodies. `same` treats the links of such a pair"
-            " as different tool frames, and not as a difference between the models."
+            "Pairs of matched links that `same` treats as different tool frames. The pose between two tool"
+            " frames is a change of B, and not a difference between the models."
         ),
     ]
     orders: Annotated[

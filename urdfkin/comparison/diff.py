@@ -97,7 +97,7 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Effect of one changed joint, while all other joints are unchanged.
+    """Effect of one changed joint or link, while all others are unchanged.
 
     Attributes:
         element: The changed element, for example "joint elbow".

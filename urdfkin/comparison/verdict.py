@@ -837,10 +837,7 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
-        """Return the angle (rad) between two axes, and the distance (m) of one origin from the other axis.
-
-        The distance is 0 for a prismatic joint.
-        """
+        """Return the angle (rad) between two axes, and the distance (m) of one origin from the other axis."""
         ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 

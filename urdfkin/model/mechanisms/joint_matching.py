@@ -205,17 +205,14 @@ class JointMatcher:
         return known
 
     def mismatch(self, e: Edge, f: Edge, motion_a: FloatArray, motion_b: FloatArray) -> tuple[float, float]:
-        """Return the difference of two joint axes.
+        """Return the angle (rad) and the distance (m) between the axes of two joints.
 
-        Returns:
-            Angle (rad) and distance (m).
-
-            | Joints | Angle | Distance |
-            |---|---|---|
-            | revolute | between the axes | between the axes |
-            | prismatic | between the axes | 0 |
-            | planar | between the normals | 0 |
-            | floating, or of different kinds | 0 | 0 |
+        | Joints | Angle | Distance |
+        |---|---|---|
+        | revolute | between the axes | between the axes |
+        | prismatic | between the axes | 0 |
+        | planar | between the normals | 0 |
+        | floating, or of different kinds | 0 | 0 |
         """
         kind = motion_type(self.a.joint(e).kind)
         if kind != motion_type(self.b.joint(f).kind):
@@ -322,7 +319,7 @@ _NEARLY_PARALLEL_SINE = 1e-2
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference_line: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of an axis of A and an axis of B after the joints `via`.
+    """Yield pairs of axes of A and B after the joints `via`.
 
     A branch ends at the first axis that is not nearly parallel to `reference_line[0]`, because nearly
     parallel axes determine zero offsets inexactly.
@@ -502,10 +499,10 @@ def _first_revolute_axes(
     bodies: Both[int],
     earlier_pairs: tuple[Both[Axis], ...],
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the first revolute axes of each branch of A with each branch of B.
+    """Pair the first revolute axis of each branch of A with the first revolute axis of each branch of B.
 
-    Each item contains these two axes, the pairs of prismatic axes before, and the result of `later_axes`.
-    Branches without revolute axes give their last prismatic axes instead.
+    Each item contains the pair, the earlier pairs of prismatic axes, and the result of `later_axes`. Branches
+    without revolute axes give their last pair of prismatic axes.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -562,7 +559,7 @@ class _Match:
     """An exact match of two subtrees.
 
     Attributes:
-        X: (4, 4) motion of B's body after the joint to A's body, in the zero configuration.
+        X: (4, 4) motion that moves B's next body to A's next body, in the zero configuration.
     """
 
     X: FloatArray

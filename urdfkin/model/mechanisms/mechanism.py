@@ -342,9 +342,8 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_by_body[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """Yield one iterator for each run of consecutive joints.
+        """Yield all orders with the same motion (lists of joint names) for each run of consecutive joints.
 
-        The iterator yields lists of joint names: all orders of the run's joints with the same motion.
         The current order comes first.
         """
         run: list[Edge] = []
@@ -433,13 +432,9 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, float]:
-    """Return the difference of two axes.
+    """Return the angle (rad) between two axes, and the distance (m) of `s.point` from the line t.
 
-    Opposite directions count as parallel.
-
-    Returns:
-        Angle (rad) between s and t, and distance (m) of `s.point` from the line t. If `with_distance` is
-        False, the distance is 0.
+    Opposite directions count as parallel. Without `with_distance`, the distance is 0.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -759,8 +754,7 @@ class Variables:
             joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
         rule_differences: Indices of the joint pairs with different mimic rules.
-        coordinates_b: Functions that compute B's coordinates from the variables. The keys are the names of
-            B's joints.
+        coordinates_b: Functions that compute B's coordinates from the variables, by joint name.
     """
 
     pairs: tuple[MatchedValues | None, ...]
@@ -795,11 +789,10 @@ class _VariablesBuilder:
         self.alignment, self.tolerance = alignment, tolerance
         self.trees = alignment.a.tree, alignment.b.tree
         self.step_of_b = {step.b: step for step in alignment.steps}
-        self.coordinates_b = self._find_coordinates()
+        self.coordinates_b = self._find_coordinates_b()
         self.depth = alignment.depth
 
-    def _find_coordinates(self) -> dict[str, LinearFunction]:
-        """Express each coordinate of B by a variable."""
+    def _find_coordinates_b(self) -> dict[str, LinearFunction]:
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         mimic_joints_last = sorted(own, key=self._is_mimic_in_a)
@@ -868,10 +861,10 @@ class _VariablesBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """The range of a variable is the intersection of the limits of all joints that the variable moves.
+        """Intersect the limits of all joints that a variable moves.
 
         If the intersection is empty or a single value, the limits in A are the range.
-        The limits of mimic joints are ignored: mimic joints follow their rules beyond these limits.
+        The limits of mimic joints are ignored, because mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

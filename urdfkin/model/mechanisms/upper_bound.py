@@ -287,10 +287,7 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Return an upper bound (rad) on the angle between the frame's rotations in A and B.
-
-    The bound is the sum of the largest angles that the differences can cause.
-    """
+    """Return the sum of the largest angles (rad) that the differences between A and B can cause."""
     total = pose_difference(IDENTITY, frame.constant_motion)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.constant_motion)[0]
@@ -325,7 +322,7 @@ def _distance_bound(
 
 
 def _displacement_bound(L: FloatArray, reach: float) -> float:
-    """Return |R - 1| `reach` + |p|, a bound (m) on the displacement of a point with |y| <= `reach` by L."""
+    """Return |R - 1| reach + |p|, an upper bound on |L y - y| (m) for L = (R, p) and |y| <= reach."""
     rotation, translation = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return translation + _product(rotation, reach)
 
@@ -532,7 +529,7 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield joints i and j <= i, and a bound on the length of D's second derivative by their values."""
+    """Yield joints i and j <= i, and a bound on the second derivative of D with respect to their values."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
@@ -620,8 +617,8 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints that affect the length of D, and the values of these joints.
 
-    The result begins at the first joint that differs. If an earlier joint shares a variable with a joint of
-    the result, the result begins at the earlier joint.
+    The result begins at the first joint that differs, or at an earlier joint that shares a variable with a
+    joint of the result.
     """
     steps, pairs = (
         alignment.path(frame.previous),
