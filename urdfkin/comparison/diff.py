@@ -126,8 +126,8 @@ class Changes:
         effects: Effect of each changed joint or link that moves frames, while all others are unchanged. An
             effect that cannot be computed is missing, for example the effect of a new joint, or of a joint
             with another parent link. Empty if the argument `effects` is False.
-        total: The frame with the largest displacement by all changes. None if no listed change moves a frame,
-            or if the argument `effects` is False.
+        total: The matching frame with the largest displacement by all changes. None if no listed change moves
+            a matching frame, or if the argument `effects` is False.
         rounding: Proven bounds on the distance (m) and the angle (rad) between matching frames, if single
             precision explains every difference in motion. `changes` does not list these differences. Infinite
             if no bounds were proven, for example if the argument `effects` is False. None if the formats are
