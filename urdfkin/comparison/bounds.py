@@ -1,12 +1,12 @@
 """Compute lower and upper bounds on the largest distance between a frame's positions in two models.
 
-**Search.** The search starts at the sampled configurations with the largest distances, and varies one
-coordinate at a time. The largest distance found is a lower bound of the true largest distance.
+**Lower bound.** `DistanceSearch` starts at the sampled configurations with the largest distances, and varies
+one coordinate at a time. The largest distance found is a lower bound.
 
-**Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
-between the models. Each term is the largest effect of one difference over all configurations. If the models
-differ in many places, the sum is far above the largest distance. `tighten` divides the ranges of the
-variables into boxes, and bounds the distance in each box. The largest of these bounds is sharper.
+**Upper bound.** `urdfkin.model.mechanisms.upper_bound` adds up the largest effects of all differences between
+the models. These effects can be largest in different configurations, so their sum can be far above the
+largest distance. `tighten` reduces the sum by branch and bound: it divides the ranges of the variables into
+boxes, and bounds the distance in each box by a Taylor polynomial and its remainder.
 
     D(q) = p_B - p_A              difference of the frame's positions in B and A
     D_i                           derivative of D with respect to variable i
@@ -18,7 +18,9 @@ variables into boxes, and bounds the distance in each box. The largest of these 
 
     |D(q)| <= max over |x_i| <= h_i of |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
 
-If the bound of a box is at most the target, the box is finished. Otherwise, the box is halved.
+A box is finished if its bound is at most the target. All other boxes are halved along the same variable. The
+search ends if all boxes are finished, or at the maximum number of boxes. The result is the largest bound of
+the unfinished boxes, or the target without such boxes.
 """
 
 from __future__ import annotations
@@ -47,7 +49,6 @@ from urdfkin.verify.oracle import QueryBatch
 #: Number of configurations that are sampled uniformly within the joint ranges.
 RANDOM_SAMPLES = 512
 #: Number of random configurations at corners of the joint ranges.
-#: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
 #: Number of starting points of the search for one frame.
 STARTING_POINTS = 4
@@ -109,8 +110,8 @@ class DistanceSearch:
 
         Args:
             z: (n, variables) values of the variables.
-            random_free_joints: Whether A's planar and floating joints have random coordinates. If False,
-                their coordinates are neutral.
+            random_free_joints: Whether A's planar and floating joints have random coordinates instead of
+                neutral ones.
 
         Returns:
             (n, nq) configurations of both robots.
@@ -136,14 +137,9 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Check whether two configurations correspond.
+        """Return whether q_a (1, nq) of A and q_b (1, nq) of B are corresponding configurations.
 
-        Each variable must be within its search range `ends`. The planar and floating joints of A must be in
-        their neutral configurations.
-
-        Args:
-            q_a: (1, nq) configuration of A.
-            q_b: (1, nq) configuration of B.
+        Each variable must be within its range in `ends`. A's planar and floating joints must be neutral.
         """
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
@@ -166,11 +162,9 @@ class DistanceSearch:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses in A's root frame.
+        """Return poses (n, frames, 4, 4) of A's frames and of B's frames, all in A's root frame.
 
-        Returns:
-            Poses (n, frames, 4, 4) of A's frames, and poses (n, frames, 4, 4) of B's frames. The transform
-            `FramePair.tool` is removed from B's poses.
+        B's poses do not include the transform `FramePair.tool`.
         """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -201,11 +195,7 @@ class DistanceSearch:
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sample_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances at the values nearest to zero, at corners, and at random values.
-
-        Returns:
-            Distances (n, frames) in m, and values (n, variables) of the variables.
-        """
+        """Return distances (n, frames), m, and the sampled values (n, variables) of the variables."""
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
         corners = np.where(self.rng.random((CORNER_SAMPLES, len(self.names))) < 0.5, low, high)
@@ -227,10 +217,7 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Search for the largest distances by varying one coordinate at a time.
-
-        The search starts at `z` (frames, starting points, variables).
-        """
+        """Maximize each frame's distance, starting at `z` (frames, starting points, variables)."""
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
@@ -257,10 +244,9 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (frames, starting points, trials), m.
+        """Return the distance (m) of each frame k at the values `z[k]` of the variables.
 
-        For frame k, the variables have the values `z[k]`. The shape of `z` is (frames, starting points,
-        trials, variables).
+        The shape of `z` is (frames, starting points, trials, variables).
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -352,7 +338,7 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and its derivatives D_i (n, 3, variables) at the box centers `c`."""
+        """Return D (n, 3) and its derivatives D_i (n, 3, variables) at the box centers c (n, variables)."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -364,10 +350,7 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
-
-        `point` (3,) is the point's position in `frame`.
-        """
+        """Return the position (n, 3) and the Jacobian (n, 3, nv) of `point` (3,), given in `frame`."""
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not point.any():
@@ -432,7 +415,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Count the halvings of one h_i at a time until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
+    """Count the halvings of box widths until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

@@ -97,15 +97,15 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """Conversion of a planar or floating joint's pose from A to B: `T_B = M T_A N`."""
+    """Conversion of a planar or floating joint's pose from A to B: `T_B = M T_A N` or `T_B = M T_A^-1 N`."""
 
     before: Annotated[TransformRows, doc("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[TransformRows, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
         doc(
-            "Whether the formula contains the inverse of the pose in A. It does if the joint's parent link in"
-            " A corresponds to the joint's child link in B."
+            "Whether the formula is `T_B = M T_A^-1 N`. The inverse is necessary if the joint's parent link"
+            " in A matches the joint's child link in B."
         ),
     ]
 
@@ -196,8 +196,8 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. The last entries are joints of only one model,"
-            " and links that different joints carry."
+            "Differences, in order from the base to the tips. The list ends with the joints of only one"
+            " model, and the links after different moving joints in A and B."
         ),
     ]
     remarks: Annotated[
@@ -209,8 +209,8 @@ class SameCertificate(Header):
     tools: Annotated[
         list[ToolEntry],
         doc(
-            "Matched links that have different poses on their matching rigid bodies. `same` reports the links"
-            " of a pair as different tools."
+            "Pairs of matched links that `same` treats as different tool frames. The pose between two tool"
+            " frames is a change of B, and not a difference between the models."
         ),
     ]
     orders: Annotated[
@@ -280,7 +280,8 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
     `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` makes a second
-    comparison, in which `same` matches the joints. The second verdict must also be "differs".
+    comparison with the joint matching of `same`, without the argument `map`. The second verdict must also be
+    "differs".
 
     Returns:
         A line for each statement that is wrong or not proven.
@@ -440,7 +441,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Compare two entries up to rounding. `zero` is the absolute tolerance."""
+    """Return whether two entries are equal up to rounding; `zero` is the absolute tolerance."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -490,10 +491,7 @@ def _interval_errors(
     *,
     use_branch_and_bound: bool,
 ) -> Iterator[str]:
-    """Yield an error for each wrong or unproven bound.
-
-    `rounding` contains the largest rounding errors of a distance (m) and an angle (rad).
-    """
+    """Yield an error for each wrong or unproven bound; `rounding` contains rounding errors (m, rad)."""
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)

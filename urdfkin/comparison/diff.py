@@ -97,7 +97,7 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Effect of one changed joint, while all other joints are unchanged.
+    """Effect of one changed joint or link, while all others are unchanged.
 
     Attributes:
         element: The changed element, for example "joint elbow".
@@ -123,13 +123,15 @@ class Changes:
         sources: Sources of the old and the new version.
         changes: The changes. For versions of the same format, a change of the robot's name comes first, then
             changes of joints, then changes of links.
-        effects: Effect of each changed joint or link that moves frames, while all others are unchanged. A
-            new joint has no entry, because its effect cannot be computed.
-        total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
-            is false.
-        rounding: Bound on the pose errors from the single precision of USD files: a distance (m) and an angle
-            (rad). Infinite if the bound was not computed. `changes` does not list these errors. Only a
-            comparison with the verdict `UP_TO_SINGLE` has a bound; otherwise None.
+        effects: Effect of each changed joint or link that moves frames, while all others are unchanged. An
+            effect that cannot be computed is missing, for example the effect of a new joint, or of a joint
+            with another parent link. Empty if the argument `effects` is False.
+        total: The matching frame with the largest displacement by all changes. None if no listed change moves
+            a matching frame, or if the argument `effects` is False.
+        rounding: Proven bounds on the distance (m) and the angle (rad) between matching frames, if single
+            precision explains every difference in motion. `changes` does not list these differences. Infinite
+            if no bounds were proven, for example if the argument `effects` is False. None if the formats are
+            equal, or if the verdict of `same` is not `UP_TO_SINGLE`.
     """
 
     sources: tuple[str, str]

@@ -188,10 +188,7 @@ def _compare_reader(
 
 
 def _library_input(robot: Robot) -> tuple[str, str]:
-    """Return the input of a library and its format, for example "urdf".
-
-    The input is the URDF text, or the path of the MJCF or USD file.
-    """
+    """Return the URDF text, or the path of the MJCF or USD file, and the format, for example "urdf"."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -257,8 +254,8 @@ def _find_cause(
 ) -> tuple[str, str]:
     """Return the cause of a difference, for example "origin rpy" or "axis", and a description.
 
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The pose
-    with index 0 belongs to the neutral configuration.
+    `T` (urdfkin) and `T_theirs` (library) are poses (n, 4, 4) of the child link in the parent link's frame.
+    The first pose belongs to the neutral configuration.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

@@ -324,8 +324,8 @@ class Sameness(Displayable):
         after: Changes that reduce the differences between B and A as far as possible, one line each. The
             models may still differ after the changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
-        differences: The differences, ordered from the base to the tips. Joints of only one model and links
-            that different joints carry come last.
+        differences: The differences, ordered from the base to the tips. The list ends with the joints of only
+            one model, and the links after different moving joints in A and B.
         remarks: Differences without effect on motion, for example joint limits, joint types, and links of
             only one model.
         joints: Pairs of matching joints of A and B.
@@ -657,10 +657,10 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 
 
 def changes_of_b(alignment: Alignment, rounding: Tolerance) -> tuple[tuple[str, str], ...]:
-    """Return the kind and the text of each change in `Sameness.after`.
+    """Return the kind and the text of each change in `Sameness.after`, and store tool poses in `alignment`.
 
-    The function stores the tool poses in `alignment`. Every displaced frame of a Denavit-Hartenberg table
-    counts as a tool, because the table's convention determines the frames.
+    Every displaced frame of a Denavit-Hartenberg table counts as a tool, because the table's convention
+    determines the frames.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -864,7 +864,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _tilt_and_shift(pair: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m). Values within the tolerance `rounding` become 0."""
+    """Return the tilt (rad) and the shift (m), or 0 for a value within the tolerance `rounding`."""
     return (
         pair.tilt if pair.tilt > rounding.angle else 0.0,
         pair.shift if pair.shift > rounding.distance else 0.0,

@@ -214,7 +214,7 @@ class Comparator:
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
-        """Return the verdict and the differences. The function also stores the tool frames in `alignment`."""
+        """Return the verdict and the differences, and store the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         changes = changes_of_b(alignment, self.tolerance)
@@ -278,11 +278,7 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound how far single precision and rounding can displace frames.
-
-        Returns:
-            Distance, m, and angle, rad; None if no model has single precision.
-        """
+        """Return bounds (m, rad) on the frame displacements by single precision and rounding."""
         if all(robot.single is None for robot in self.robots):
             return None
         pairs = [(frame.a, frame.b) for frame in alignment.frames]
@@ -318,7 +314,7 @@ class Comparator:
         )
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Align the unchanged models. Joints, joint orders and comparable links are those of `alignment`."""
+        """Align the unchanged models with the joint pairs, joint orders and links of `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -349,7 +345,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound how far rounding can displace frames.
+        """Return bounds (m, rad) on the frame displacements by rounding.
 
         `same` ignores a small difference at each joint:
 
@@ -362,9 +358,6 @@ class Comparator:
             distance <= depth d + slides + angle * reach
 
         Each joint in `Sameness.unlimited` is assumed to travel at most `ASSUMED_LIMIT`.
-
-        Returns:
-            Distance, m, and angle, rad.
         """
         pairs = [
             (step.kind, pair)
@@ -403,7 +396,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Bound the distance (m) and the angle (rad) between frames of the unchanged models."""
+        """Return bounds (m, rad) on the differences between frames of the unchanged models."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -435,7 +428,7 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Try to reduce the upper bounds in `uppers` to at most `target` (m) by branch and bound.
+        """Sharpen the bounds above `target` (m) by branch and bound, the largest bound first.
 
         The method stops at the first bound that stays above `target`.
         """
@@ -455,8 +448,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_REFINED_FRAMES]]
-        # If all sampled distances are within rounding, the search uses only the frame with the largest
-        # upper bound on the angle.
+        # If all distances are within rounding, the frame with the largest bound on the angle is used.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -474,9 +466,9 @@ class Comparator:
         attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
-        """Return the interval of a frame.
+        """Return a frame's interval.
 
-        `attained`: largest distance found (m), and the variables' values there; None if the frames agree.
+        `attained` contains the largest distance found (m), and the variables' values there.
         """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
@@ -494,7 +486,7 @@ class Comparator:
     def _confirm(
         self, alignment: Alignment, variables: Variables, bounds: Sequence[float] | float | None
     ) -> Confirmation:
-        """Check bounds (m) on the distances of frames: one bound for each frame, or one for all frames."""
+        """Check bounds (m) on the distances with Pinocchio: one for each frame, or one for all frames."""
         if bounds is None:
             return Confirmation("not asked", reason="bounds=False, so there is no bound to check")
         if not all(as_verify(robot.verifier.policy) for robot in self.robots):
@@ -544,7 +536,7 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each planar, floating and prismatic joint pair with its travel (m), infinite without limits."""
+    """Yield each joint pair that can translate, with its travel (m); infinite without limits."""
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
             yield step, math.inf
@@ -560,8 +552,7 @@ def _joints_fixed_in_one(
 ) -> set[int]:
     """Return the indices of the fixed joints of `tree` that move in `other_tree`.
 
-    Joints match by their names or by their child links. `names` maps joint names of `tree` to names of
-    `other_tree`.
+    Joints match by their names, translated by `names`, or by the labels of their child links.
     """
     moving = {joint.name for joint in other_tree.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
@@ -607,8 +598,7 @@ def _match_usd_spellings(
     """Match the names of a USD model and of another model, because USD changes the spelling of names.
 
     Returns:
-        The link names of A and B, in the spelling of the model that is not USD; and a dict from joint names
-        of A to joint names of B.
+        The link names of A and B in the original spelling, and a dict from joint names of A to those of B.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -624,7 +614,7 @@ def _match_usd_spellings(
 
 
 def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
-    """Map USD spellings to original names; omit a spelling with several possible original names."""
+    """Map USD spellings to original names, without ambiguous spellings."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -636,8 +626,8 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
 
-    If B's root body has a link with the name of A's root, this link is placed at A's root. If A's root body
-    has a link with the name of B's root, B's root is placed at this link. Otherwise, the roots coincide.
+    A's root coincides with the link of the same name on B's root body. Without this link, B's root coincides
+    with the link of the same name on A's root body. Without both links, the roots coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])
@@ -746,7 +736,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in alignment.frames}
         self.steps = {step.a: step for step in alignment.steps}
         root_of_b = next((a for a, b in self.pairs.items() if b == 0), 0)
-        #: The link of A and the link of B at which the compared paths begin.
+        #: Links of A and B at which the compared paths begin.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (root_of_b, 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -772,7 +762,7 @@ class JointComparison:
     def places_in_second_model(self) -> dict[str, str]:
         """Map each matched link and joint of the first model, for example "joint j", to its match.
 
-        A fixed joint is mapped to the joint before the link that matches its child link.
+        Fixed joints match if their child links match.
         """
         a, b = self.trees
         places = {f"link {a.links[link]}": f"link {b.links[other]}" for link, other in self.pairs.items()}
@@ -784,10 +774,7 @@ class JointComparison:
         return places
 
     def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
-        """Return P and the joints from P to a link. P is the nearest ancestor that is a common link.
-
-        If no ancestor is a common link, P is `start[0]`.
-        """
+        """Return P and the joints from P to a link; without a common ancestor link, P is `start[0]`."""
         joints, path = self.trees[0].joints, list[int]()
         while link:
             path.insert(0, link - 1)
@@ -816,7 +803,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
-        # `paths[1][0]` contains the joints from the last common ancestor (C in the docstring) to P in B.
+        # `paths[1][0]` contains the joints from C to P in B.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(
                 name, "", None, "the joints between this link and the nearest common link cannot be compared"
@@ -850,11 +837,7 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
-        """Return the angle (rad) and the distance (m) between two axes.
-
-        The distance is measured from one joint's origin to the other joint's axis. It is 0 for a prismatic
-        joint.
-        """
+        """Return the angle (rad) between two axes, and the distance (m) of one origin from the other axis."""
         ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
@@ -869,8 +852,8 @@ class JointComparison:
             path: Joints from C to the link.
 
         Returns:
-            A dict from each joint of `path` to its screw and error bounds; the link pose; and the error
-            bounds of this pose. Error bounds are two numbers, in m and rad.
+            The screw and the error bounds (m, rad) of each joint of `path`; the link pose; and the error
+            bounds (m, rad) of this pose.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

@@ -83,12 +83,9 @@ class JointMatcher:
     def pair_joints(
         self, bodies: tuple[int, int], via: PreviousEdges, motion_a: FloatArray, motion_b: FloatArray
     ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
-        """Pair the joints at two bodies.
+        """Return joint pairs at two bodies, unpaired joints of A, and unpaired joints of B.
 
         `BodyPair` describes the arguments.
-
-        Returns:
-            Joint pairs, unpaired joints of A, and unpaired joints of B.
         """
         named, unpaired_a, unpaired_b = self.pair_by_name(bodies, via)
         pairs = list(named)
@@ -153,9 +150,9 @@ class JointMatcher:
     def rank_candidates(
         self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray
     ) -> list[Edge]:
-        """Return the joints of B. The joint most similar to `e` comes first.
+        """Return the joints of B that `name_map` does not contain; the joint most similar to `e` comes first.
 
-        X (4, 4) moves B before the comparison. Joints named in `name_map` are omitted.
+        X (4, 4) moves B before the comparison.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -208,17 +205,14 @@ class JointMatcher:
         return known
 
     def mismatch(self, e: Edge, f: Edge, motion_a: FloatArray, motion_b: FloatArray) -> tuple[float, float]:
-        """Return the difference of two joint axes.
+        """Return the angle (rad) and the distance (m) between the axes of two joints.
 
-        Returns:
-            Angle (rad) and distance (m).
-
-            | Joints | Angle | Distance |
-            |---|---|---|
-            | revolute | between the axes | between the axes |
-            | prismatic | between the axes | 0 |
-            | planar | between the normals | 0 |
-            | floating, or of different kinds | 0 | 0 |
+        | Joints | Angle | Distance |
+        |---|---|---|
+        | revolute | between the axes | between the axes |
+        | prismatic | between the axes | 0 |
+        | planar | between the normals | 0 |
+        | floating, or of different kinds | 0 | 0 |
         """
         kind = motion_type(self.a.joint(e).kind)
         if kind != motion_type(self.b.joint(f).kind):
@@ -279,10 +273,9 @@ class Axis:
         return Axis(self.screw.transform(T), self.turns, self.reference_line.transform(T))
 
     def nearest_point_coordinate(self, u: FloatArray) -> float | None:
-        """Find the point of the reference line that is nearest to the axis.
+        """Return the coordinate along u (m) of the reference line's point that is nearest to the axis.
 
-        Returns:
-            The point's coordinate along u (m); None for prismatic joints and parallel lines.
+        The result is None for prismatic joints and parallel lines.
         """
         s, start = self.screw, self.reference_line
         # A formula with 1 - cos^2 of the angle loses all digits at angles below 1e-8.
@@ -318,18 +311,18 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
             yield candidate
 
 
-#: Two axes are nearly parallel if the sine of their angle is below this value. An error of one axis can move
-#: the nearest points of nearly parallel axes by more than 100 times the error.
+#: Two axes are nearly parallel if the sine of their angle is below this value.
+#: An error of one axis can then move the nearest points of the axes by more than 100 times the error.
 _NEARLY_PARALLEL_SINE = 1e-2
 
 
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference_line: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of axes: an axis of A after the joint `via[0]`, and an axis of B after the joint `via[1]`.
+    """Yield pairs of axes of A and B after the joints `via`.
 
-    A branch stops after the first axis of A that is clearly not parallel to `reference_line[0]`. A nearly
-    parallel axis determines zero offsets inexactly.
+    A branch ends at the first axis that is not nearly parallel to `reference_line[0]`, because nearly
+    parallel axes determine zero offsets inexactly.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
@@ -342,8 +335,8 @@ def later_axes(
             )
 
 
-#: Number of Gauss-Newton steps. Two steps are usually enough. If axes are parallel up to 1e-8 rad, a step can
-#: change an angle by 1 rad, and more steps are necessary.
+#: Number of Gauss-Newton steps; two steps are usually enough.
+#: If axes are parallel up to 1e-8 rad, more steps are necessary, and a step can change an angle by 1 rad.
 _REFINEMENT_STEPS = 10
 #: A step with smaller changes (rad and m) is the last one.
 _NEGLIGIBLE_CHANGE = 1e-14
@@ -352,8 +345,8 @@ _NEGLIGIBLE_CHANGE = 1e-14
 def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoices:
     """Solve for B's root pose and all zero offsets together, so that all axes of B coincide with axes of A.
 
-    The search computes one zero offset after another, and fails if an axis depends on two unknown offsets. If
-    axes are nearly parallel, the rounding error of one offset displaces later axes by much more.
+    `MechanismMatcher` finds one zero offset after another. This fails if an axis depends on two unknown
+    offsets, or if nearly parallel axes magnify the rounding error of an offset.
 
     Args:
         alignment: Every joint is revolute or prismatic.
@@ -421,8 +414,7 @@ def _errors(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    If no other axis determines the rotation about A's axis, the rotation is 0. If no other axis determines
-    the shift along A's axis, the shift is 0.
+    The rotation about A's axis and the shift along A's axis are 0 unless other axes determine them.
     """
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
@@ -443,8 +435,7 @@ def root_poses_by_siblings(
 ) -> Iterator[FloatArray]:
     """Yield poses of B's root that align up to three joint axes of one body.
 
-    If the aligned axes do not determine the shift along the first axis, later axes determine the shift.
-    If no later axis determines the shift, the shift is 0.
+    Later axes determine the shift along the first axis if the aligned axes do not. The default is 0.
     """
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
@@ -508,11 +499,10 @@ def _first_revolute_axes(
     bodies: Both[int],
     earlier_pairs: tuple[Both[Axis], ...],
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """For each branch of A with each branch of B, return the first revolute axes of both branches.
+    """Pair the first revolute axis of each branch of A with the first revolute axis of each branch of B.
 
-    A pair is an axis of A and an axis of B. Each item contains the first pair of revolute axes, all pairs of
-    prismatic axes before this pair, and the result of `later_axes`. If the branches have no revolute axes,
-    the first entry is the last pair of prismatic axes.
+    Each item contains the pair, the earlier pairs of prismatic axes, and the result of `later_axes`. Branches
+    without revolute axes give their last pair of prismatic axes.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -553,27 +543,23 @@ def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None)
     return Axis(screw, mechanism.joint(edge).kind.turns, reference_line or screw)
 
 
-#: Function that proposes poses of the next body of B.
-#: The first argument contains the next bodies of A and B.
-#: The second argument contains A's joint before its next body, and B's joint before its next body.
-#: The third argument is the pose of B's current body.
+#: Function that proposes poses of B's next body.
+#: The arguments are the next bodies of A and B, the joints before them, and the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
 #: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
 MAX_ASSIGNMENTS = 5000
 
-#: The keys are the coordinates of A.
-#: Each value contains the matching coordinate of B, and B's velocity divided by A's velocity.
+#: Map from a coordinate of A to the matching coordinate of B, and B's velocity divided by A's velocity.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """The result of an exact match of two subtrees.
+    """An exact match of two subtrees.
 
     Attributes:
-        X: (4, 4) motion that moves B's body to A's body, in the zero configuration.
-            Both bodies come after the joint.
+        X: (4, 4) motion that moves B's next body to A's next body, in the zero configuration.
     """
 
     X: FloatArray
@@ -689,7 +675,7 @@ class SubtreeMatcher:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _merge_ratios(self, some: VelocityRatios, others: VelocityRatios) -> VelocityRatios | None:
-        """The result is None if a coordinate has two different partners or two different ratios."""
+        """Return None if a coordinate has two different partners or two different ratios."""
         for x in some.keys() & others.keys():
             (y, ratio), (other, other_ratio) = some[x], others[x]
             tolerance = self.tolerance.angle * max(1.0, abs(other_ratio))

@@ -5,11 +5,8 @@ the matcher chooses the sign (`sense`) and the zero offset. The best choice make
 links and axes of B coincide with links and axes of A. `align` compares the results for several starting
 bodies and joint orders.
 
-If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. A has
-the rule `v = m w + c`, and B has the corresponding rule `v' = m' w' + c'`. The matched joints have the values
-`v' = s v + o` and `w' = s' w + o'`, with the signs s and s' and the zero offsets o and o'. The rules are
-equivalent if `m' s' = s m` and `m' o' + c' = s c + o`. For a revolute joint, a multiple of a full turn may
-always be added to o.
+If no axis and no link frame follows a joint, only mimic rules can determine the joint's zero offset. The
+class `_RulePair` contains the equations.
 """
 
 from __future__ import annotations
@@ -56,15 +53,11 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MAX_EXACT_SEARCH_DEPTH = 200
-#: If several choices at a joint are equally good, the joints after this joint decide.
-#: The matcher compares at most this number of joints on each branch.
+#: Maximum number of later joints on each branch that decide between equally good choices at a joint.
 LOOK_AHEAD_DEPTH = 6
-#: The search for an exact match computes poses of B's root from axes.
-#: For each pair of bodies where the search starts, the search uses at most this number of poses.
+#: Maximum number of root poses that the exact search computes from axes, for each pair of start bodies.
 MAX_ROOT_POSES = 48
-#: A score with more agreeing links and axes is better.
-#: For equal numbers, a score with a much smaller difference (m) is better.
-#: The smaller difference must be less than this factor times the larger difference.
+#: Of two scores with equal counts, one is better if its difference is less than this factor times the other.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -75,12 +68,9 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the comparisons that decide between equally good choices at a joint.
+    """A limit on the number of later joint pairs that decide between equally good choices.
 
-    A matcher compares later joints of A with later joints of B. Several matchers can share a limit.
-
-    Attributes:
-        remaining: Number of joint pairs that may still be compared.
+    Several matchers can share a limit.
     """
 
     remaining: int
@@ -90,14 +80,13 @@ class LookAhead:
 class BodyPair:
     """A body of A and the corresponding body of B.
 
+    Two links agree if motion_a @ (zero pose of A's link) is equal to motion_b @ (zero pose of B's link).
+
     Attributes:
-        via: The joints of A and of B before the bodies. None for the bodies at which the search starts.
-        previous: Index in `Alignment.steps` of the two joints before the two bodies. -1 if the list does
-            not contain them.
-        motion_a: (4, 4) motion G, the product of the motions L at earlier joints.
-        motion_b: (4, 4) motion of B's body. The root pose, earlier zero offsets and earlier conversions
-            determine this motion. The matcher compares motion_a @ (zero pose of A's link) with
-            motion_b @ (zero pose of B's link).
+        via: The joints before the bodies. None at the start of the search.
+        previous: Index of these joints in `Alignment.steps`, or -1.
+        motion_a: (4, 4) product of the motions L at earlier joints.
+        motion_b: (4, 4) motion of B's body by the root pose, earlier zero offsets and earlier conversions.
     """
 
     bodies: tuple[int, int]
@@ -110,9 +99,8 @@ class BodyPair:
 class MechanismMatcher:
     """Match the joints of two mechanisms.
 
-    Without `choices`, the matcher searches for B's root pose, signs, zero offsets and conversions.
-    `base` contains the indices of the links of A and B where the search starts.
-    If `base` is None, the matcher chooses the links.
+    `choices` prescribes B's root pose, signs, zero offsets and conversions. `base` contains the indices of
+    the links of A and B where the search starts. If an argument is None, the matcher finds the values.
     """
 
     def __init__(
@@ -328,11 +316,7 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair a link of A with a link of B as end-effector frames.
-
-        The label of each link occurs in one model only. The result is None if a body has no such link. The
-        result is also None if other links of the bodies are matched.
-        """
+        """Pair two links with unshared labels as end-effector frames, if the bodies have no matched links."""
         links_a, links_b = self._unshared_links(body_pair)
         if matched or not links_a or not links_b:
             return None
@@ -464,10 +448,10 @@ class MechanismMatcher:
         compensation: FloatArray | None,
         next_poses: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N in P_b = M P_a N; see the module `mechanism`.
+        """Yield candidates for the rigid motion N in P_b = M P_a N.
 
-        `compensation` is one possible N of a planar joint. A floating joint has the value None. `pose_a`
-        includes `motion_a`.
+        `compensation` is one possible N of a planar joint, or None for a floating joint. `pose_a` includes
+        `motion_a`.
         """
         yield IDENTITY if compensation is None else compensation
         candidates = [next_pair.motion_b]
@@ -571,10 +555,9 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_OffsetOrPose, BodyPair]], depth: int
     ) -> tuple[_OffsetOrPose, BodyPair, Score]:
-        """Return the zero offset or the pose with the most agreeing links and axes.
+        """Return the zero offset or the pose with the best score.
 
-        Later joints decide between equally good choices. For example, perpendicular axes that intersect
-        allow two poses of B, so a third axis decides.
+        Later joints decide between equally good choices, for example at intersecting perpendicular axes.
         """
         scored = list[tuple[_OffsetOrPose, BodyPair, Score]]()
         for choice, body_pair in choices:
@@ -707,11 +690,7 @@ def _joints_in_subtrees(mechanism: Mechanism, body: int, edges: Sequence[Edge]) 
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest rotation of A's planar joint that makes its plane parallel to B's plane.
-
-    Returns:
-        (4, 4) rotation, its angle (rad), and the shift 0.
-    """
+    """Return the smallest rotation (4, 4) to parallel planes, its angle (rad), and the shift 0."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
         start, end.reverse() if start.direction @ end.direction < 0.0 else end, turns=False
@@ -790,10 +769,7 @@ def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Exchange the partners of two joint pairs if this improves the alignment.
-
-    Robots with mirrored arms can need exchanges.
-    """
+    """Exchange the partners of two joint pairs, for example of mirrored arms, if the alignment improves."""
     # If a joint exists in one model only, no exchange of pairs makes the two models agree.
     if best.only_a or best.only_b:
         return best
@@ -840,8 +816,8 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
 def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """If axes or links do not agree, solve for B's root pose and all zero offsets together.
 
-    For a table, start also from alignments with larger tolerances. The frames of a table do not determine
-    zero offsets. If axes are nearly parallel, they determine the zero offsets only together.
+    The frames of a table do not determine zero offsets. Nearly parallel axes determine the zero offsets only
+    together.
     """
     agrees = best.all_joints_agree if best.has_free_frames else best.is_complete
     if agrees or best.only_a or best.only_b or not 0 < len(best.steps) <= MAX_REFINED_JOINTS:
@@ -886,8 +862,7 @@ def _best_alignment(
 
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
-#: Allowed difference between a computed zero offset and the zero offset of a mimic rule,
-#: as a multiple of the angle tolerance.
+#: Allowed change of a computed zero offset by mimic rules, as a multiple of the angle tolerance.
 #: A computed zero offset is inexact if the axes of the joint and of a later joint nearly coincide.
 OFFSET_TOLERANCE_FACTOR = 1e4
 
@@ -937,10 +912,7 @@ class _RulePair:
 
 
 def zeros_by_mimic_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return new zero offsets that fit the mimic rules.
-
-    The keys are A's joint names, the values are signs and zero offsets (rad or m).
-    """
+    """Map joint names of A to signs and new zero offsets (rad or m) that fit the mimic rules."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _group_rule_pairs(alignment):
         alphas = [rule.slope_a / rule.slope_b for rule in rules if rule.slope_b]

@@ -95,10 +95,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
 
 
 def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """Return the smallest rotation from u to v, and its angle (rad).
-
-    The arguments are unit vectors.
-    """
+    """Return the smallest rotation from the unit vector u to the unit vector v, and its angle (rad)."""
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
@@ -109,11 +106,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 
 def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """Return the difference of two poses.
-
-    Returns:
-        Angle (rad) and distance (m).
-    """
+    """Return the angle (rad) and the distance (m) between two poses."""
     R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Python floats are faster than small NumPy arrays
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
@@ -127,10 +120,7 @@ def angle_about(u: FloatArray, R: FloatArray) -> float:
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """Return the angle (rad) about u from x to y.
-
-    The result is None if x or y is parallel to u.
-    """
+    """Return the angle (rad) about u from x to y; None if x or y is parallel to u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
     if min(np.linalg.norm(x), np.linalg.norm(y)) < PARALLEL_TOLERANCE:
         return None
@@ -153,7 +143,7 @@ class FreeJointConversion:
     Attributes:
         before: Rigid motion M (4, 4).
         behind: Rigid motion N (4, 4).
-        back: Whether one model reverses the joint.
+        back: Whether P_a^-1 replaces P_a, because one model reverses the joint.
     """
 
     before: FloatArray
@@ -236,10 +226,7 @@ def out_of_plane_compensation(M: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screw:
-    """A joint's axis as a directed line.
-
-    `direction` is a unit vector.
-    """
+    """A joint's axis as a directed line; `direction` is a unit vector."""
 
     direction: FloatArray
     point: FloatArray
@@ -355,9 +342,8 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_by_body[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """Yield one iterator for each run of consecutive joints.
+        """Yield all orders with the same motion (lists of joint names) for each run of consecutive joints.
 
-        The iterator yields lists of joint names: all orders of the run's joints with the same motion.
         The current order comes first.
         """
         run: list[Edge] = []
@@ -378,7 +364,7 @@ class Mechanism:
                     yield [self.joint(edge).name, *others]
 
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
-        """The kinds of two joints decide whether the joints commute.
+        """Return whether two joints can be exchanged without a change of the motion.
 
         | kinds | commute |
         |---|---|
@@ -446,13 +432,9 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, float]:
-    """Return the difference of two axes.
+    """Return the angle (rad) between two axes, and the distance (m) of `s.point` from the line t.
 
-    Opposite directions count as parallel.
-
-    Returns:
-        Angle (rad) between s and t, and distance (m) of `s.point` from the line t. If `with_distance` is
-        False, the distance is 0.
+    Opposite directions count as parallel. Without `with_distance`, the distance is 0.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -554,10 +536,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def move_difference_to_tool(self) -> FramePair:
-        """Return a copy in which `tool` contains the difference between A's frame and B's frame.
-
-        In the copy, `constant_motion` is the identity, and `tilt` and `shift` are 0.
-        """
+        """Return a copy in which `tool` contains the difference between A's frame and B's frame."""
         tool = inverse(self.zero_pose) @ self.constant_motion @ self.zero_pose
         return replace(self, constant_motion=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -622,8 +601,7 @@ class Alignment:
     def inner_difference_range(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
-        A link pair is ignored if neither link has a child joint. The result is (0, 0) if all other pairs
-        agree.
+        A link pair is ignored if neither link has a child joint.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -739,10 +717,7 @@ class LinearFunction:
         return LinearFunction(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def evaluate(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Evaluate the function.
-
-        A variable that is not in `values` is 0.
-        """
+        """Return the function's value; a variable that is not in `values` is 0."""
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
 
@@ -757,9 +732,8 @@ class MatchedValues:
     b: LinearFunction
     #: The value `sense * b + offset`, which uses the positive direction and the zero of B's joint.
     b_unconverted: LinearFunction
-    #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: For such functions, `rounding` (rad or m) is max(0, D - E). For all other functions, `rounding` is 0.
-    #: D is the absolute difference between the constants of the two computed functions.
+    #: Nonzero only if the computed functions differ by rounding, so that `b` is set equal to `a`.
+    #: The value is max(0, D - E), rad or m, with the difference D of the computed constants.
     #: E is the rounding error of one joint.
     rounding: float = 0.0
 
@@ -780,8 +754,7 @@ class Variables:
             joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
         rule_differences: Indices of the joint pairs with different mimic rules.
-        coordinates_b: Functions that compute B's coordinates from the variables. The keys are the names of
-            B's joints.
+        coordinates_b: Functions that compute B's coordinates from the variables, by joint name.
     """
 
     pairs: tuple[MatchedValues | None, ...]
@@ -816,11 +789,10 @@ class _VariablesBuilder:
         self.alignment, self.tolerance = alignment, tolerance
         self.trees = alignment.a.tree, alignment.b.tree
         self.step_of_b = {step.b: step for step in alignment.steps}
-        self.coordinates_b = self._find_coordinates()
+        self.coordinates_b = self._find_coordinates_b()
         self.depth = alignment.depth
 
-    def _find_coordinates(self) -> dict[str, LinearFunction]:
-        """Express each coordinate of B by a variable."""
+    def _find_coordinates_b(self) -> dict[str, LinearFunction]:
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         mimic_joints_last = sorted(own, key=self._is_mimic_in_a)
@@ -889,10 +861,10 @@ class _VariablesBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """The range of a variable is the intersection of the limits of all joints that the variable moves.
+        """Intersect the limits of all joints that a variable moves.
 
         If the intersection is empty or a single value, the limits in A are the range.
-        The limits of mimic joints are ignored: mimic joints follow their rules beyond these limits.
+        The limits of mimic joints are ignored, because mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

@@ -220,7 +220,7 @@ def point_support(grid: Grid, p: FloatArray) -> Support:
 
 
 def _polygon_around_arc(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Return the angle (rad) of each corner, and the distance of the corner from the circle's centre."""
+    """Return each corner's angle (rad) and distance from the centre of the unit circle."""
     if high - low >= _FULL_TURN:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
@@ -287,10 +287,7 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Return an upper bound (rad) on the angle between the frame's rotations in A and B.
-
-    The bound is the sum of the largest angles that the differences can cause.
-    """
+    """Return the sum of the largest angles (rad) that the differences between A and B can cause."""
     total = pose_difference(IDENTITY, frame.constant_motion)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.constant_motion)[0]
@@ -325,12 +322,7 @@ def _distance_bound(
 
 
 def _displacement_bound(L: FloatArray, reach: float) -> float:
-    """Return an upper bound (m) on the displacement of a point y by L.
-
-    L consists of the rotation R and the translation p, and |y| is at most `reach`. The bound is:
-
-    `|R - 1| reach + |p|`
-    """
+    """Return |R - 1| reach + |p|, an upper bound on |L y - y| (m) for L = (R, p) and |y| <= reach."""
     rotation, translation = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return translation + _product(rotation, reach)
 
@@ -351,8 +343,8 @@ def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after a joint's motion and L."""
-    # A planar or floating joint can rotate d by any angle. Therefore, h(u) = |u| max |d| is an upper bound on
-    # the new support function of d.
+    # A planar or floating joint can rotate d by any angle.
+    # Therefore, h(u) = |u| max |d| is an upper bound on the new support function of d.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -394,10 +386,9 @@ def d_support_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of p' - p for two matched prismatic joints.
+    """Return the support function of t' u' - t u for two matched prismatic joints.
 
-    A's joint translates by p = t u, and B's joint translates by p' = t' u'. The difference is largest if each
-    joint value is at a limit.
+    The difference is linear in the joint values, so it is largest at limits.
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
@@ -414,14 +405,9 @@ def _prismatic_difference(
 
 
 def _variable_samples(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return samples of the variable that moves two matched revolute joints.
+    """Return samples (n,) of the common variable of two revolute joints, or None.
 
-    Returns:
-        (n,) samples, or None in these cases:
-
-            - The joints have different variables.
-            - The variable's range needs more than `MAX_SAMPLE_INTERVALS` intervals.
-            - The variable's range is infinite, and a slope is not 0, 1 or -1.
+    One turn covers an infinite range only if the slopes are 0, 1 or -1.
     """
     if (name := pair.variable) is None:
         return None
@@ -543,10 +529,7 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield joint indices i and j <= i, and an upper bound on the length of a second derivative of D.
-
-    The second derivative is with respect to the values of joints i and j.
-    """
+    """Yield joints i and j <= i, and a bound on the second derivative of D with respect to their values."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
@@ -578,7 +561,7 @@ def _length_bound_at_base(
 ) -> float:
     """Return an upper bound on the length of d at the base.
 
-    `supports` contains the support functions of d and y without the motion L of `steps[-1]`.
+    `supports` does not include the motion L of `steps[-1]`.
     """
     supports = supports_after_constant_motion(steps[-1], *supports)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
@@ -608,7 +591,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
     `d_i = u x d + (u' - u) x (y - o') + u x (o - o')`
     `y_i = u' x (y - o')`
 
-    The arguments d and y contain the joint's motion, and x is the cross product.
+    The arguments d and y include the joint's motion.
     """
     G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
@@ -634,8 +617,8 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints that affect the length of D, and the values of these joints.
 
-    The result begins at the first joint that differs. If an earlier joint shares a variable with a joint of
-    the result, the result begins at the earlier joint.
+    The result begins at the first joint that differs, or at an earlier joint that shares a variable with a
+    joint of the result.
     """
     steps, pairs = (
         alignment.path(frame.previous),
