@@ -44,7 +44,6 @@ from urdfkin.verify.oracle import (
     read_mimic_rules,
 )
 
-#: urdfkin requires these versions of Pinocchio.
 #: Tests confirm the definitions of accelerations and J-dot only for Pinocchio 4.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
@@ -123,7 +122,6 @@ MAX_NV = 315
 _FLOATS_PER_BLOCK = 16384
 #: A function of n that returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
-#: Name of the free-flyer's joint and frame.
 _BASE_NAME = "base"
 
 #: Prefix of link names while Pinocchio reduces a model. XML forbids U+0001, so no URDF name has this prefix.
@@ -225,11 +223,7 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer as the base.
-
-        Returns:
-            New joint indices and frame indices.
-        """
+        """Add a free-flyer as the base. Return the new indices of joints and frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects links with the name of a joint, so all joints and frames get unique names.
         for j in joints:
@@ -256,7 +250,6 @@ class PinocchioOracle(Oracle):
         return self._pin.ReferenceFrame.names[name]
 
     def _convert_inputs(self, x: QueryBatch, input_count: int) -> tuple[FloatArray, ...]:
-        """Convert the first `input_count` inputs to Pinocchio's vectors."""
         q, *v_and_a = x.inputs[:input_count]
         full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:

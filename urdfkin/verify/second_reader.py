@@ -110,10 +110,7 @@ def compare_with_yourdfpy(
 
 
 def read_with_yourdfpy(text: str) -> yourdf.Robot:
-    """Read a URDF text without meshes.
-
-    yourdfpy may raise any exception.
-    """
+    """Read a URDF text without meshes. yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
     # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
@@ -130,11 +127,7 @@ def read_with_yourdfpy(text: str) -> yourdf.Robot:
 def _compare_joints(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield the differences between two joints.
-
-    Yields:
-        Pairs (difference, known fault). The fault is "" if the difference is not a known fault.
-    """
+    """Yield pairs (difference, known fault). The fault is "" if the difference is not a known fault."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""

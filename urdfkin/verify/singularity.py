@@ -163,8 +163,7 @@ class _SingularityExplainer:
         directions = U[:, self._rank :].T
         directions = _make_orthonormal_basis(directions - directions @ fixed_directions @ fixed_directions.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, they cannot be distinguished from directions that are lost only at
-        # one q.
+        # If these directions depend on q, they look like directions that are lost only at this q.
         is_known = len(directions) == generic_rank - self._rank and not (
             self._frame_jacobian.moving_base and fixed_directions.size
         )
@@ -184,10 +183,9 @@ class _SingularityExplainer:
         return Singularity(self._rank, full_rank, smallest_value_bound, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Return the largest rank of the sampled Jacobians, and a matrix of directions without motion.
+        """Return the largest rank of the sampled Jacobians, and orthonormal columns.
 
-        Each column of the matrix is a direction in which the frame moves in no sample. The columns are
-        orthonormal.
+        The columns span the directions in which the frame moves in no sample.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         generic_rank = max(
