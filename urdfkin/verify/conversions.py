@@ -211,8 +211,8 @@ def check_model_source(verifier: Verifier, converted: ConvertedModel, source: An
     model, tree = getattr(source, "model", source), verifier.tree
     if model.nv > MAX_NV:
         return (
-            f"not compared with the model itself: nv is {model.nv}, and Pinocchio needs too much memory if nv is"
-            f" larger than {MAX_NV}"
+            f"not compared with the model itself: nv is {model.nv},"
+            f" and Pinocchio needs too much memory for nv > {MAX_NV}"
         )
     q = np.vstack((neutral(tree), sample(tree, _SAMPLE_COUNT, np.random.default_rng(0))))
     names = [*converted.joints, *converted.frames]

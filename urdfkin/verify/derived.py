@@ -56,9 +56,9 @@ def derive_analytical_jacobian(
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's relative placements with a bound.
+    """Return an oracle's poses of the frames b relative to frame a, with a bound.
 
-    The last frame of `x.plan` is frame a. The placements are the poses of the frames b relative to frame a:
+    The last frame of `x.plan` is frame a.
 
         s_a, s_b: length of the path from the world origin to the frame
         k_a, k_b: allowed rounding errors of the frame's placement, in eps

@@ -36,10 +36,8 @@ from urdfkin.urdf.mujoco import import_mujoco
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Number of coordinates of a free joint.
 _FREE_JOINT_SIZE = 7
 _MAX_NAMES = 5
-#: Maximum size of the output of a process, bytes.
 MAX_OUTPUT_BYTES = 400_000_000
 
 _MEMORY_HINT = f"it takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"

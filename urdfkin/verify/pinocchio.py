@@ -5,12 +5,10 @@ PyPI project `pinocchio` contains plugins for the test runner nose, in a module 
 `pinocchio`. If both projects are installed, Python imports the plugins.
 
 The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF text with its own parser.
-`urdfkin.verify.oracle` converts the user's arguments for Pinocchio and finds frames and joints by name.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
 if their mimic joints are enabled. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic
-joints, and have the suffix "full". `urdfkin.verify.oracle` reads the mimic rules from the URDF text. The
-rules define a matrix G and a vector g_0 for the conversion:
+joints, and have the suffix "full". The mimic rules define a matrix G and a vector g_0 for the conversion:
 
     q_full = G q + g_0
     v_full = G v
@@ -139,8 +137,8 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    Without enough memory or stack, Pinocchio would crash the process. `lock` contains the values of locked
-    joints in rad or m. If `lock_mimic_joints` is True, the mimic joints of locked joints are locked too.
+    A limit on nv and a large stack prevent a crash of the process. `lock` contains the values of locked
+    joints, rad or m. With `lock_mimic_joints`, the mimic joints of locked joints are locked too.
 
     Raises:
         OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.

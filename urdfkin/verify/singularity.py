@@ -121,10 +121,7 @@ class Singularity(Displayable):
 def explain_singularity(
     frame_jacobian: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
-    """Explain a loss of rank in one configuration.
-
-    `lower` and `upper` (k,) bound the singular values.
-    """
+    """Explain a loss of rank. `lower` and `upper` (k,) bound the singular values."""
     rank, full_rank = int((lower > 0.0).sum()), len(lower)
     if rank == full_rank:
         smallest_value_bound = float(upper[-1]) if full_rank else 0.0

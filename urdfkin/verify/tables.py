@@ -204,8 +204,6 @@ def _max_ratio(found: FloatArray, unit: FloatArray | float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class RelativeMotion:
-    """Motion of a tip relative to a base."""
-
     placement: FloatArray  # (n, 4, 4)
     jacobian: FloatArray  # (n, 6, nv)
     acceleration: FloatArray  # (n, 6)
@@ -307,7 +305,7 @@ class _SnapEffect:
     | Vector | Change at most |
     |---|---|
     | z x d | turn * reach + 2 * metres |
-    | product of two vectors z x d | twice the change of z x d |
+    | z x (z x d) | twice the change of z x d |
     | cross product of two axes | 2 * turn |
     """
 

@@ -54,8 +54,6 @@ _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The robot of a USD stage, as plain data."""
-
     urdf: str
     remarks: tuple[UsdRemark, ...]
     path: str
