@@ -146,7 +146,7 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """The bits equal those of `_fill_without_kernel`."""
     joints = lengths.joints
-    # If all configurations share one row, the stride is 0, and the kernel receives only this row.
+    # A stride of 0 means that all configurations share one row. The kernel receives only this row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -185,7 +185,7 @@ class _MovingJoint(NamedTuple):
 class _FrameEnd(NamedTuple):
     """The part of a frame's path after the last moving joint."""
 
-    step: int  # Index of this joint in `_Lengths.joints`, or -1.
+    step: int  # Index of this joint in `_Lengths.joints`, or -1 without a moving joint.
     frame: int
     length: float  # m.
 
@@ -674,8 +674,8 @@ def sign_limit(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
 def singularity_margin(plan: CompiledTree) -> float:
     """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    The margin is four times the error of a frame's rotation, for a base without rotation. Below the margin,
-    no digit of the Euler angles is reliable.
+    The margin is four times the error of a frame's rotation if the base has no rotation. Below the margin, no
+    digit of the Euler angles is reliable.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 

@@ -598,8 +598,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: a mimic rule is invalid, or the oracle has other joints or coordinates than the tree,
-                or another order.
+            OracleError: a mimic rule is invalid, or the oracle's joints or coordinates have other names or
+                another order than the tree's.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}

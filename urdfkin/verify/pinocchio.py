@@ -110,7 +110,7 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 
 #: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: In any thread, Pinocchio can read chains with fewer joints than this number without a stack overflow.
+#: In any thread, Pinocchio reads chains with fewer joints without a stack overflow.
 _SAFE_DEPTH = 100
 #: Maximum nv of a robot, mimic joints included.
 #: At this limit, Pinocchio 4.1.0 needs 2 GB: its memory is about 64 nv^3 bytes (measured).

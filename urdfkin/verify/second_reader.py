@@ -31,12 +31,12 @@ from urdfkin.verify.oracle import resolve_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
+#: Bound on the difference of an entry if two programs compute a rotation matrix from the same angles.
 #: An entry is a b c + d e with sines and cosines a to e, and |a b c| + |d e| <= 1.
 #: Each sine and cosine has a relative error of at most one eps, which changes the entry by at most 3 eps.
 #: Rounding the products and the sum changes the entry by at most 1.5 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Bound on the difference of a component of an axis that two programs normalised.
+#: Bound on the difference of a component if two programs normalise an axis.
 #: In urdfkin and yourdfpy, the relative error of an axis's length is at most 2 eps.
 #: The quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS

@@ -51,8 +51,8 @@ class FrameJacobian:
             several columns, and for a joint with a mimic joint.
         active_entries: (6, nv) False for entries of J that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
-            base. A moving base can change the directions without motion.
-        moving_base: Whether a base motion is given.
+            base.
+        moving_base: Whether a base motion is given. A base motion can change the directions without motion.
     """
 
     J: FloatArray

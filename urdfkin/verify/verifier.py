@@ -132,7 +132,7 @@ class Verifier:
         )
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
+        # Pinocchio may accept a robot with fewer moving joints, even if it refuses the original robot.
         known_refusal = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -147,7 +147,7 @@ class Verifier:
         return verifier
 
     def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
-        """Return why an oracle cannot check the robot, or None."""
+        """Return the reason why an oracle cannot check the robot, or None."""
         if library is PINOCCHIO and self.known_refusal is not None:
             return self.known_refusal
         if library.name not in self._refusals:
