@@ -16,9 +16,8 @@ independent joint to the joint's value:
 | planar | three numbers (x, y, angle) |
 | floating | seven numbers (x, y, z, qx, qy, qz, qw) |
 
-An adapter passes all inputs that the library's documentation requires. An adapter gives the library only the
-values of independent joints. The library can read the mimic rules in the file. If the library computes wrong
-poses, the adapter does not correct them.
+An adapter passes all inputs that the library's documentation requires. It passes only values of independent
+joints, because the library can read the mimic rules in the file. An adapter does not correct wrong poses.
 """
 
 from __future__ import annotations

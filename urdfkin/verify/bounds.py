@@ -15,7 +15,7 @@ scale can be broadcast to the shape of the results.
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. Rotations do
 not amplify errors, so the error of a number grows linearly with the number of joints. Pinocchio replaces an
-axis that is close to a coordinate axis by the coordinate axis. The tilts add the error of this replacement.
+axis near a coordinate axis by the coordinate axis. The tilt is the angle between both axes.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -34,8 +34,8 @@ rounding error:
 | LOCAL | rotation into the frame's axes |
 | WORLD | cross product with the frame's position p |
 
-In measurements, each joint adds less than eps * scale to a difference. Rounding errors rarely all have the
-same sign. Reports state each difference as a multiple of eps * scale.
+In measurements, each joint adds less than eps * scale to a difference, because rounding errors rarely all
+have the same sign. Reports state each difference as a multiple of eps * scale.
 
 *Magnitudes.* `compute_magnitudes` evaluates the equations 7.58 and 7.127 to 7.130 with lengths instead of
 vectors (`urdfkin.kinematics.number_kinds`). No length is negative, so no intermediate value exceeds the
@@ -107,9 +107,8 @@ def compute_magnitudes(
 ) -> Magnitudes:
     """Return upper bounds for all frames.
 
-    `base` is the result of `BaseMotion.state`: one row for all configurations, or n rows.
-    If `v` is None, the function computes only `p` and `roundings`. If `a` is None, the joint accelerations
-    are 0.
+    `base` is the result of `BaseMotion.state`, with one row or n rows. Without `v`, only `p` and `roundings`
+    are valid. Without `a`, the joint accelerations are 0.
     """
     n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
@@ -147,7 +146,7 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """The bits equal those of `_fill_without_kernel`."""
     joints = lengths.joints
-    # If all configurations share one row, the stride is 0, and the kernel receives only this row.
+    # A stride of 0 means that all configurations share one row. The kernel receives only this row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -174,43 +173,27 @@ def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _MovingJoint(NamedTuple):
-    """A moving joint.
-
-    Attributes:
-        parent: Index of the previous moving joint in `_Lengths.joints`, or -1 for the base.
-        length: Path length from the previous moving joint, m.
-        multiplier: Absolute mimic multiplier.
-        offset: Absolute mimic offset, rad or m.
-    """
-
     kind: int
     q: int
     v: int
-    parent: int
-    length: float
-    multiplier: float
-    offset: float
+    parent: int  # Index in `_Lengths.joints`, or -1 for the base.
+    length: float  # Path length from the previous moving joint, m.
+    multiplier: float  # Absolute mimic multiplier.
+    offset: float  # Absolute mimic offset, rad or m.
 
 
 class _FrameEnd(NamedTuple):
-    """The part of a frame's path after the last moving joint.
+    """The part of a frame's path after the last moving joint."""
 
-    Attributes:
-        step: Index of the last moving joint on the path in `_Lengths.joints`, or -1 without a moving joint.
-        length: Length after this joint, m.
-    """
-
-    step: int
+    step: int  # Index of this joint in `_Lengths.joints`, or -1 without a moving joint.
     frame: int
-    length: float
+    length: float  # m.
 
 
 class _Lengths(NamedTuple):
-    """`tables` contains the numbers of `joints` and `ends` as arrays, for the kernel."""
-
     joints: list[_MovingJoint]
     ends: list[_FrameEnd]
-    tables: tuple[NDArray[Any], ...]
+    tables: tuple[NDArray[Any], ...]  # `joints` and `ends` as arrays, for the kernel.
 
 
 def _get_lengths(plan: CompiledTree) -> _Lengths:
@@ -236,7 +219,7 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _as_columns(x: FloatArray, n: int) -> Any:
-    """For n = 1 configurations, the columns are Python numbers, which are faster than arrays."""
+    """For n = 1, return Python numbers, which are faster than arrays."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
@@ -266,10 +249,7 @@ def _propagate_position(joint: _MovingJoint, state: LinkBounds, q: Any) -> LinkB
 
 
 def _free_lengths(joint: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the norms of a joint's displacement, velocities and accelerations.
-
-    The order is displacement, angular velocity, linear velocity, angular acceleration, linear acceleration.
-    """
+    """Return the norms of displacement, angular and linear velocity, angular and linear acceleration."""
     at, (translations, rotations) = joint.v, _TRANSLATION_ROTATION_COUNTS[joint.kind]
     (u, o), (u_rate, o_rate) = (
         (
@@ -314,9 +294,9 @@ class Bound:
 
 
 def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
-    """Broadcast `bound.k` to the batch shape `shape`.
+    """Broadcast `bound.k` to a batch shape.
 
-    If k <= 0 or k = inf, k becomes NaN. No result is within a bound with k = NaN.
+    If k <= 0 or k = inf, k becomes NaN, so that no result is accepted.
     """
     k = bound.k.reshape(bound.k.shape[: len(shape)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -337,7 +317,7 @@ def make_bound(
 
 @_allow_overflow
 def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
-    """Convert the magnitudes of Pinocchio's computation to those of MuJoCo's computation.
+    """Convert magnitudes for Pinocchio to magnitudes for MuJoCo.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass:
 
@@ -651,8 +631,8 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
         additional joint in k: at least 24 eps (`PINOCCHIO_ROUNDINGS`) > 13 eps
     """
     s = axis_sine - EPS * magnitudes.roundings
-    # s is now a lower bound on |e_i x t|. If s is not positive, the scale becomes infinite.
-    # The comparison accepts no result with an infinite scale.
+    # Now, s is a lower bound on |e_i x t|.
+    # For s = 0, the scale is infinite, and the comparison accepts no result.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
@@ -694,19 +674,19 @@ def sign_limit(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
 def singularity_margin(plan: CompiledTree) -> float:
     """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    The margin is four times the error of a frame's rotation, for a base without rotation. Below the margin,
-    no digit of the Euler angles is reliable.
+    The margin is four times the error of a frame's rotation if the base has no rotation. Below the margin, no
+    digit of the Euler angles is reliable.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """For each path and joint velocity, add up |multiplier| of the joints that move with this velocity.
+    """Sum |multiplier| over the joints of a path that share a joint velocity.
 
     For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
     Returns:
-        Two arrays (frames, nv): the sums for rotations and the sums for translations.
+        Sums (frames, nv) for rotations, and sums (frames, nv) for translations.
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
@@ -726,9 +706,8 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    If the result is False, the Jacobian entry is 0 for every q. For the reference WORLD with
-    `root_at_origin=True`, a base motion can still make the entry nonzero. For the other references, the
-    result does not depend on `root_at_origin`.
+    All other entries are 0 for every q. For WORLD with `root_at_origin=True`, a base motion can make these
+    entries nonzero. The other references ignore `root_at_origin`.
 
         linear rows of a revolute joint: z x d
         WORLD: d leads from the joint to the world's origin

@@ -64,10 +64,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, leading_axes: in
 
 
 def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare differences with the bound.
-
-    `units` contains the largest difference in each result, in multiples of eps * scale.
-    """
+    """Compare `units`, the largest difference in each result in eps * scale, with the bound."""
     if not units.size:
         return BatchComparison()
     bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))
@@ -103,10 +100,7 @@ def worst_disagreements(
 ) -> FloatArray:
     """Return the largest difference in each result, in multiples of eps * scale.
 
-    The first `leading_axes` axes of `ours` are batch axes. All other axes belong to one result.
-
-    Returns:
-        Array of shape `ours.shape[:leading_axes]`.
+    The result has the first `leading_axes` axes of `ours`. The other axes belong to one result.
     """
     leading, own = ours.shape[:leading_axes], ours.shape[leading_axes:]
     n, width = math.prod(leading), math.prod(own)

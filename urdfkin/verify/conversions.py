@@ -126,8 +126,8 @@ def check_opw(verifier: Verifier, chain: FrameChain, opw: OpwParameters) -> str 
     metres = np.linalg.norm(found[:, :3, 3] - tip[:, :3, 3], axis=-1).max()
     radians = rotation_angle(found[:, :3, :3], tip[:, :3, :3]).max()
     return (
-        "the OPW solver's tip pose base . F(sign q - offset) . tool differs from Pinocchio by at most"
-        f" {metres:.2e} m and {radians:.2e} rad on {len(q)} samples"
+        f"the OPW solver's tip pose differs from Pinocchio's by at most {metres:.2e} m and {radians:.2e} rad"
+        f" on {len(q)} samples; tip pose = base . F(sign q - offset) . tool"
     )
 
 
@@ -139,8 +139,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     coordinate_sum = np.abs(coordinates).sum(axis=-1)
     differences = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     chain = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the placements of the base and the tip relative to the root. The product of
-    # exponentials is the placement of the tip relative to the base.
+    # Pinocchio computes the placements of the base and the tip relative to the root.
+    # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + chain.reach + float(chain.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (chain.base, chain.tip))
     rounding = EPS * (joint_roundings(joints) + coordinate_sum) + sum_zeroed_tilts(chain)
@@ -207,13 +207,13 @@ def check_orientations(
 
 
 def check_model_source(verifier: Verifier, converted: ConvertedModel, source: Any) -> str:
-    """Compare a robot with its source model.
-
-    `source` is a pinocchio.Model or a RobotWrapper.
-    """
+    """Compare a robot with its source, a pinocchio.Model or a RobotWrapper."""
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MAX_NV:  # Pinocchio's memory grows with the cube of nv.
-        return f"not compared with the model itself: nv is {model.nv}, more than {MAX_NV}"
+    if model.nv > MAX_NV:
+        return (
+            f"not compared with the model itself: nv is {model.nv},"
+            f" and Pinocchio needs too much memory for nv > {MAX_NV}"
+        )
     q = np.vstack((neutral(tree), sample(tree, _SAMPLE_COUNT, np.random.default_rng(0))))
     names = [*converted.joints, *converted.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
@@ -273,8 +273,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     differences = np.abs(theirs - table.placement(own))[:, :3]
-    # The rotations of the table's base and tool may be rounded to six digits, but the URDF contains exact
-    # rotations.
+    # The table's base and tool may have rotations with six digits, but the URDF contains exact rotations.
     # The bound therefore includes the orthogonality error of the table's rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * written_urdf_roundings(rows) + defect

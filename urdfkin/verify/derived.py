@@ -32,10 +32,7 @@ from urdfkin.verify.oracles import OracleLibrary
 def derive_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's analytical Jacobians with a bound.
-
-    `compute_bound` returns the bound on velocity Jacobians.
-    """
+    """`compute_bound` returns the bound on velocity Jacobians."""
     aligned = Reference.LOCAL_WORLD_ALIGNED
     J_v = oracle.jacobians(x.query._replace(reference=aligned))
     magnitudes = library.adapt_magnitudes(compute_magnitudes(x.plan, x.q, None, None, x.state))
@@ -59,9 +56,9 @@ def derive_analytical_jacobian(
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's relative placements with a bound.
+    """Return an oracle's poses of the frames b relative to frame a, with a bound.
 
-    The last frame of `x.plan` is frame a. The placements are the poses of the frames b relative to frame a:
+    The last frame of `x.plan` is frame a.
 
         s_a, s_b: length of the path from the world origin to the frame
         k_a, k_b: allowed rounding errors of the frame's placement, in eps
@@ -90,7 +87,6 @@ def derive_relative_placement(
 def derive_imu_reading(
     oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's IMU readings with a bound."""
     local, (v, a) = Reference.LOCAL, x.rates
     query = x.query._replace(reference=local)
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)

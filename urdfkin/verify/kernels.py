@@ -81,9 +81,9 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Write to `units` the largest difference of the rows x, y and z in each column.
+    """Write the largest difference of the rows x, y and z in column j to `units[j]`.
 
-    The difference in column j is in multiples of `unit[j]`. It may be NaN or inf.
+    The difference is in multiples of `unit[j]`, and may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])

@@ -56,11 +56,10 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
-        answer: Last answer that contains a robot, from the process that reads the file.
-        shapes_refusal: Reason why the robot comes from the file without shapes and inertias. None for a robot
-            that comes from the complete file. The reason has no meaning if `with_check_data` was False.
-        pinocchio: Answer of Pinocchio's MJCF reader: the placements of bodies, or an error. None without an
-            answer.
+        answer: Last answer with a robot, from the process that reads the file.
+        shapes_refusal: Reason why MuJoCo compiles the file only without shapes and inertias. None if MuJoCo
+            compiles the complete file. Not valid with `with_check_data=False`.
+        pinocchio: Placements of bodies by Pinocchio's MJCF reader, an error, or None without an answer.
     """
 
     urdf: str
@@ -76,8 +75,7 @@ def read_mjcf(
 ) -> MjcfReading:
     """Read an MJCF file or text in a separate process.
 
-    If `with_check_data` is True, the process computes data for `check_mjcf_source`.
-    `timeout` is in seconds.
+    With `with_check_data`, the process computes data for `check_mjcf_source`. `timeout` is in seconds.
 
     Raises:
         InputError: MuJoCo or urdfkin does not accept the file, or the process ends without a robot.

@@ -36,10 +36,8 @@ from urdfkin.urdf.mujoco import import_mujoco
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Number of coordinates of a free joint.
 _FREE_JOINT_SIZE = 7
 _MAX_NAMES = 5
-#: Maximum size of the output of a process, bytes.
 MAX_OUTPUT_BYTES = 400_000_000
 
 _MEMORY_HINT = f"it takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
@@ -63,10 +61,7 @@ def serve() -> None:
 
 
 def make_error_answer(error: Exception, what: str) -> dict[str, Any]:
-    """Return an answer that describes `error`.
-
-    If `error` is not an `UrdfkinError`, `what` states the problem.
-    """
+    """Describe an error. If the error is not an `UrdfkinError`, `what` states the problem."""
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
         return {"error": parts | {"found": _add_memory_hint(error.found)}}
@@ -213,7 +208,6 @@ def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, t
     """Yield each joint's name, index in q and size.
 
     Pinocchio combines the joints `x` and `y` of a body into `Composite_x`.
-    Each of the joints `x` and `y` has one number in Pinocchio's q.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -57,8 +57,7 @@ _REPLACEMENT_JOINTS = {
     "floating": ("slide x", "slide y", "slide z", "ball"),
 }
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and joint velocities for each kind of joint.
-#: Kinds without an entry have one coordinate and one joint velocity.
+#: Pairs (nq, nv). Kinds without an entry have (1, 1).
 _JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -73,24 +72,15 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """First indices of a moving joint.
-
-    Attributes:
-        qpos: Index in MuJoCo's vector.
-        qvel: Index in MuJoCo's vector.
-        q: Index in urdfkin's q; -1 for a moving base. A mimic joint has the mimicked joint's index.
-        v: Index in urdfkin's v; -1 for a moving base or locked joint.
-        multiplier: Multiplier of the mimic rule; 1 without a rule, 0 for a locked joint.
-        offset: Offset of the mimic rule, or the value of a locked joint.
-    """
+    """First indices of a moving joint. A mimic joint has the `q` and `v` of the mimicked joint."""
 
     kind: str
     qpos: int
     qvel: int
-    q: int
-    v: int
-    multiplier: float
-    offset: float
+    q: int  # -1 for a moving base.
+    v: int  # -1 for a moving base or locked joint.
+    multiplier: float  # Of the mimic rule; 1 without a rule, 0 for a locked joint.
+    offset: float  # Of the mimic rule, or the value of a locked joint.
 
 
 class MujocoOracle(Oracle):
@@ -268,10 +258,9 @@ class MujocoOracle(Oracle):
     def _compute_poses(
         self, x: QueryBatch, input_count: int, store: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
-        """Return the placements of all frames.
+        """Return all placements, and call `store(body, (k, f))` for each sample k and frame f.
 
-        MuJoCo receives q (input_count = 1), q and v (2), or q, v and a (3).
-        For each sample k and frame f, this method calls `store(body, (k, f))`.
+        MuJoCo receives the first `input_count` of q, v and a.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]
@@ -382,11 +371,7 @@ class MujocoOracle(Oracle):
 
 
 def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return rotation matrices of a planar or floating joint, and the number of its slide joints.
-
-    A planar joint has matrices (n, 2, 2) and 2 slide joints. A floating joint has matrices (n, 3, 3) and 3
-    slide joints.
-    """
+    """Return rotations (n, s, s) and the number s of slide joints: planar s = 2, floating s = 3."""
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _make_rotation_matrix(_normalise_quaternion(coordinates)), 3
@@ -413,10 +398,7 @@ def _move_mass_to_root(model: Any, root: str) -> Any:
 
 
 def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints depth first, and the links root first.
-
-    Siblings are sorted by name.
-    """
+    """Return the joints depth first, with siblings sorted by name, and the links root first."""
     robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     children, child_links = dict[str, list[_Joint]](), set[str]()

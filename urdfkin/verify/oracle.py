@@ -111,18 +111,10 @@ _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
-    """First indices of a joint.
+    """First indices of a joint. A mimic joint has the `q` and `v` of the mimicked joint."""
 
-    A mimic joint has the indices `q` and `v` of the mimicked joint.
-
-    Attributes:
-        sizes: (nq, nv) in Pinocchio.
-        full_q: Index in Pinocchio's q.
-        full_v: Index in Pinocchio's v.
-    """
-
-    sizes: tuple[int, int]
-    full_q: int
+    sizes: tuple[int, int]  # (nq, nv) in Pinocchio.
+    full_q: int  # Index in Pinocchio's q.
     full_v: int
     q: int
     v: int
@@ -240,8 +232,8 @@ class Frames:
     Args:
         bodies: Frame index of each link.
         joints: Frame index of each joint.
-        parents: Frame index of the parent joint, by the frame index of the link. A missing entry means equal
-            indices.
+        parents: Frame index of a link's parent joint. The key is the link's frame index. Without an entry,
+            both indices are equal.
     """
 
     def __init__(
@@ -281,7 +273,7 @@ class Frames:
 
 
 def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Frames:
-    """List a Pinocchio model's frames. If `includes_world` is True, Pinocchio's world is the link `WORLD`."""
+    """List a model's frames. With `includes_world`, Pinocchio's world is the link `WORLD`."""
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
@@ -344,10 +336,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
 
 
 def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
-    """Return Davenport's matrix K of M.
-
-    If M is a rotation with the quaternion q, K is 4 q q^T - I.
-    """
+    """Return Davenport's matrix K of M. If M is a rotation with the quaternion q, K is 4 q q^T - I."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -359,9 +348,9 @@ def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate the linear and the angular part y of each six-vector by R^T.
+    """Rotate both parts y of each six-vector by R^T.
 
-    The quaternion has the vector part u and the scalar part w:
+    With the quaternion's vector part u and scalar part w:
 
         R^T y = y + 2 w (y x u) + 2 (y x u) x u
     """
@@ -430,17 +419,11 @@ def _parse_number(text: str) -> float:
 
 
 class BaseRows(NamedTuple):
-    """The base's motion in n configurations.
+    """The base's motion in n configurations."""
 
-    Attributes:
-        placement: (n, 4, 4).
-        velocity: (n, 6).
-        acceleration: (n, 6).
-    """
-
-    placement: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
+    placement: FloatArray  # (n, 4, 4)
+    velocity: FloatArray  # (n, 6)
+    acceleration: FloatArray  # (n, 6)
 
 
 class QueryBatch(NamedTuple):
@@ -496,7 +479,7 @@ class OracleQuery:
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
     def cache_inputs(self) -> None:
-        """Convert and store the inputs, because an array in a mapping may share memory with `out`."""
+        """Convert the inputs before `out` changes. An array in a mapping may share memory with `out`."""
         _ = self._inputs
 
     @cached_property
@@ -554,7 +537,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
-        """Flatten the batch axes of a result, which are all axes except the last `own_axes`.
+        """Reshape a result to (n, frames, ...), without a change of the last `own_axes` axes.
 
         Raises:
             OracleError: the batch shapes of the result and of the arguments differ.
@@ -615,8 +598,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: the oracle cannot read a mimic rule, or its joints or coordinates differ from the
-                tree's in name or order.
+            OracleError: a mimic rule is invalid, or the oracle's joints or coordinates have other names or
+                another order than the tree's.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}

@@ -5,12 +5,10 @@ PyPI project `pinocchio` contains plugins for the test runner nose, in a module 
 `pinocchio`. If both projects are installed, Python imports the plugins.
 
 The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF text with its own parser.
-`urdfkin.verify.oracle` converts the user's arguments for Pinocchio and finds frames and joints by name.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
 if their mimic joints are enabled. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic
-joints, and have the suffix "full". `urdfkin.verify.oracle` reads the mimic rules from the URDF text. The
-rules define a matrix G and a vector g_0 for the conversion:
+joints, and have the suffix "full". The mimic rules define a matrix G and a vector g_0 for the conversion:
 
     q_full = G q + g_0
     v_full = G v
@@ -44,7 +42,6 @@ from urdfkin.verify.oracle import (
     read_mimic_rules,
 )
 
-#: urdfkin requires these versions of Pinocchio.
 #: Tests confirm the definitions of accelerations and J-dot only for Pinocchio 4.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
@@ -113,7 +110,7 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 
 #: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: In any thread, Pinocchio can read chains with fewer joints than this number without a stack overflow.
+#: In any thread, Pinocchio reads chains with fewer joints without a stack overflow.
 _SAFE_DEPTH = 100
 #: Maximum nv of a robot, mimic joints included.
 #: At this limit, Pinocchio 4.1.0 needs 2 GB: its memory is about 64 nv^3 bytes (measured).
@@ -123,7 +120,6 @@ MAX_NV = 315
 _FLOATS_PER_BLOCK = 16384
 #: A function of n that returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
-#: Name of the free-flyer's joint and frame.
 _BASE_NAME = "base"
 
 #: Prefix of link names while Pinocchio reduces a model. XML forbids U+0001, so no URDF name has this prefix.
@@ -141,8 +137,8 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    Without enough memory or stack, Pinocchio would crash the process. `lock` contains the values of locked
-    joints in rad or m. If `lock_mimic_joints` is True, the mimic joints of locked joints are locked too.
+    A limit on nv and a large stack prevent a crash of the process. `lock` contains the values of locked
+    joints, rad or m. With `lock_mimic_joints`, the mimic joints of locked joints are locked too.
 
     Raises:
         OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.
@@ -225,11 +221,7 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer as the base.
-
-        Returns:
-            New joint indices and frame indices.
-        """
+        """Add a free-flyer as the base. Return the new indices of joints and frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects links with the name of a joint, so all joints and frames get unique names.
         for j in joints:
@@ -256,7 +248,6 @@ class PinocchioOracle(Oracle):
         return self._pin.ReferenceFrame.names[name]
 
     def _convert_inputs(self, x: QueryBatch, input_count: int) -> tuple[FloatArray, ...]:
-        """Convert the first `input_count` inputs to Pinocchio's vectors."""
         q, *v_and_a = x.inputs[:input_count]
         full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:

@@ -368,11 +368,7 @@ def quantities_by_command() -> dict[str, Quantity]:
 
 
 def find_quantity(name: str) -> Quantity:
-    """Return the quantity with this name.
-
-    Raises:
-        UnknownNameError: no such quantity.
-    """
+    """Find a quantity, or raise UnknownNameError."""
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found
@@ -381,9 +377,7 @@ def find_quantity(name: str) -> Quantity:
 def format_replay_command(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """Return a shell command that repeats a sample.
-
-    The command contains all digits of the numbers.
+    """Return a shell command that repeats a sample, with all digits of the numbers.
 
     >>> from urdfkin.urdf.sources import Origin
     >>> format_replay_command(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})

@@ -31,12 +31,12 @@ from urdfkin.verify.oracle import resolve_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
+#: Bound on the difference of an entry if two programs compute a rotation matrix from the same angles.
 #: An entry is a b c + d e with sines and cosines a to e, and |a b c| + |d e| <= 1.
 #: Each sine and cosine has a relative error of at most one eps, which changes the entry by at most 3 eps.
 #: Rounding the products and the sum changes the entry by at most 1.5 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Bound on the difference of a component of an axis that two programs normalised.
+#: Bound on the difference of a component if two programs normalise an axis.
 #: In urdfkin and yourdfpy, the relative error of an axis's length is at most 2 eps.
 #: The quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS
@@ -110,10 +110,7 @@ def compare_with_yourdfpy(
 
 
 def read_with_yourdfpy(text: str) -> yourdf.Robot:
-    """Read a URDF text without meshes.
-
-    yourdfpy may raise any exception.
-    """
+    """Read a URDF text without meshes. yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
     # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
@@ -130,11 +127,7 @@ def read_with_yourdfpy(text: str) -> yourdf.Robot:
 def _compare_joints(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield the differences between two joints.
-
-    Yields:
-        Pairs (difference, known fault). The fault is "" if the difference is not a known fault.
-    """
+    """Yield pairs (difference, known fault). The fault is "" if the difference is not a known fault."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""

@@ -38,7 +38,6 @@ from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singu
 
 #: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
 _RELATIVE_ROUNDING_ERROR = 256.0 * EPS
-#: Maximum number of samples in the printed table.
 _MAX_PRINTED_SAMPLES = 10
 
 

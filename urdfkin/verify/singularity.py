@@ -51,8 +51,8 @@ class FrameJacobian:
             None for the columns of a planar or floating joint, and of a joint that another joint mimics.
         active_entries: (6, nv) False for entries of J that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
-            base. A moving base can change the directions without motion.
-        moving_base: Whether a base motion is given.
+            base.
+        moving_base: Whether a base motion is given. A base motion can change the directions without motion.
     """
 
     J: FloatArray
@@ -121,10 +121,7 @@ class Singularity(Displayable):
 def explain_singularity(
     frame_jacobian: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
-    """Explain a loss of rank in one configuration.
-
-    `lower` and `upper` (k,) bound the singular values.
-    """
+    """Explain a loss of rank. `lower` and `upper` (k,) bound the singular values."""
     rank, full_rank = int((lower > 0.0).sum()), len(lower)
     if rank == full_rank:
         smallest_value_bound = float(upper[-1]) if full_rank else 0.0
@@ -163,8 +160,7 @@ class _SingularityExplainer:
         directions = U[:, self._rank :].T
         directions = _make_orthonormal_basis(directions - directions @ fixed_directions @ fixed_directions.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, they cannot be distinguished from directions that are lost only at
-        # one q.
+        # If these directions depend on q, they look like directions that are lost only at this q.
         is_known = len(directions) == generic_rank - self._rank and not (
             self._frame_jacobian.moving_base and fixed_directions.size
         )
@@ -184,10 +180,9 @@ class _SingularityExplainer:
         return Singularity(self._rank, full_rank, smallest_value_bound, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Return the largest rank of the sampled Jacobians, and a matrix of directions without motion.
+        """Return the largest rank of the sampled Jacobians, and orthonormal columns.
 
-        Each column of the matrix is a direction in which the frame moves in no sample. The columns are
-        orthonormal.
+        The columns span the directions in which the frame moves in no sample.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         generic_rank = max(

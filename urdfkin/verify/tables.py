@@ -1,8 +1,8 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of the tip.
 
-Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. The table's
-base may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be
-the motion of base b and of tip t in the world, and r = p_t - p_b:
+A table computes the tip t relative to the table's base b. Pinocchio computes t and b in the world. The base
+may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
+motion of b and of t in the world, and r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
     vel  = R_b^T (v_t - v_b - w_b x r)
@@ -12,19 +12,23 @@ the motion of base b and of tip t in the world, and r = p_t - p_b:
 These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module
 implements the equations again, because the table's results come from `urdfkin.kinematics.equations`.
 
-The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
-that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
-effect of the rounded angles. The bound on rounding errors is proportional to a length, usually the robot's
-reach. The reach is the path length from the root to the table's base, plus the path length from the root to
-the tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than
-the reach, the bound uses this sum, but at most `MAX_LENGTH_RATIO` times the reach. With Hayati rows, each
-length in the table is at most `MAX_LENGTH_RATIO` times the reach (docs/dh.md). A coordinate
-and its mimic joints move together. The bound on a Jacobian column is therefore proportional to the sum of the
-absolute multipliers of these joints.
+*Bound.* The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If snapping has rounded
+angles of the table to multiples of 15 degrees, the bound includes this change. The bound on linear rows grows
+with a length L:
 
-A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
-lengths of this size cancel, the tip has an error of eps times the lengths. urdfkin accepts a difference
-within this error, and `TableCheck.loss` states the error.
+    reach = (path length from the root to the base) + (path length from the root to the tip)
+    prismatic displacements: included in both path lengths
+    S = sum of all lengths in the table
+    S <= reach:  L = reach
+    S > reach:  L = min(S, MAX_LENGTH_RATIO * reach)
+    Hayati rows: no length in the table exceeds MAX_LENGTH_RATIO * reach (docs/dh.md)
+
+*Mimic joints.* A coordinate and its mimic joints move together. The bound on a Jacobian column is therefore
+proportional to the sum of the absolute multipliers of these joints.
+
+*Loss.* Without a Hayati row, nearly parallel axes can require lengths of kilometres in the table. If two of
+these lengths cancel, the tip has an error of eps times the lengths. urdfkin accepts this error, and
+`TableCheck.loss` states it.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ from urdfkin.model.configuration import Samples
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
-#: The bound uses the sum of a table's lengths, but at most this multiple of the reach.
+#: Largest ratio of the length L to the reach (see the module).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -200,17 +204,9 @@ def _max_ratio(found: FloatArray, unit: FloatArray | float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class RelativeMotion:
-    """Motion of a tip relative to a base.
-
-    Attributes:
-        placement: (n, 4, 4).
-        jacobian: (n, 6, nv).
-        acceleration: (n, 6).
-    """
-
-    placement: FloatArray
-    jacobian: FloatArray
-    acceleration: FloatArray
+    placement: FloatArray  # (n, 4, 4)
+    jacobian: FloatArray  # (n, 6, nv)
+    acceleration: FloatArray  # (n, 6)
 
 
 def compute_relative_motion(
@@ -247,7 +243,7 @@ class ErrorScales:
     All sums are over the joints on the paths from the root to the table's base and tip.
 
     Attributes:
-        reach: (n,) reach in m, as defined in the module's docstring.
+        reach: (n,) length L of the module's docstring, m.
         turning: (columns,) sum of |multiplier| over the revolute joints.
         sliding: (columns,) sum of |multiplier| over the prismatic joints.
         rates: (n,) sum of |multiplier * v| over all joints.
@@ -309,7 +305,7 @@ class _SnapEffect:
     | Vector | Change at most |
     |---|---|
     | z x d | turn * reach + 2 * metres |
-    | product of two vectors z x d | twice the change of z x d |
+    | z x (z x d) | twice the change of z x d |
     | cross product of two axes | 2 * turn |
     """
 

@@ -5,10 +5,9 @@ from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 
 - OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin's parser must find the same bodies,
   frames, degrees of freedom and limits for each joint. A difference raises OracleError.
-- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The stage shows the robot in
-  one configuration. In the stage's configuration, each link must have its prim's placement. The file states
-  the prims' transforms separately from the joint frames. A difference means that the joint frames contradict
-  the prims' transforms; `load` reports the difference as a warning.
+- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The file states these
+  transforms separately from the joint frames. In the stage's configuration of the joints, each link must have
+  its prim's transform. `load` reports a difference as a warning.
 
 A stage stores numbers in single precision. Both comparisons allow only differences that rounding to single
 precision can cause.
@@ -41,8 +40,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Tolerance for the angle (rad) between OpenUSD's and urdfkin's frame of a joint, in roundings to single
-#: precision. `_check_joint` derives this bound.
+#: Tolerance for the angle (rad) between two frames of a joint, in roundings to single precision.
+#: `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
 #: Tolerance for the origin of a joint's frame, in roundings to single precision.
 #: `_check_joint` derives this bound.
@@ -55,8 +54,6 @@ _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The robot of a USD stage, as plain data."""
-
     urdf: str
     remarks: tuple[UsdRemark, ...]
     path: str
@@ -72,8 +69,7 @@ def read_usd(
 ) -> UsdReading:
     """Read a USD stage in a separate process.
 
-    `variants` contains pairs (variant set, variant).
-    `timeout` is in seconds.
+    `variants` contains pairs (variant set, variant). `timeout` is in seconds.
 
     Raises:
         SourceError: The file is missing.
@@ -253,7 +249,7 @@ def bound_single_precision_errors(
 
 
 def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Return a sentence about the difference between the poses of links and prims, and at most one remark.
+    """Compare the poses of links and prims. Return a sentence, and at most one remark.
 
     Bounds, with u = `SINGLE_ROUNDOFF` and n joints on the path from the root:
 

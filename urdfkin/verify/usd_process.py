@@ -60,10 +60,7 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_joints_twice(usd: Usd) -> dict[str, Any]:
-    """Return urdfkin's and UsdPhysics's description of each joint, by path.
-
-    UsdPhysics's description is None if UsdPhysics does not find the joint.
-    """
+    """Return pairs (urdfkin's description, UsdPhysics's description or None), by path."""
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
@@ -73,7 +70,6 @@ def _read_joints_twice(usd: Usd) -> dict[str, Any]:
     for paths, descriptions in parsed.values():
         for path, description in zip(paths, descriptions, strict=True):
             # For a joint with PhysicsArticulationRootAPI, OpenUSD also describes an articulation.
-            # This function skips the articulation.
             if str(path) in usd.joints and isinstance(description, physics.JointDesc):
                 found[str(path)] = _describe_joint(physics, str(path), description, usd)
     return {path: [ours.as_list(), found.get(path)] for path, ours in usd.joints.items()}
@@ -136,6 +132,6 @@ def _name_degrees_of_freedom(physics: Any, description: Any) -> str:
 
 
 def _name_direction(axis: Any) -> str:
-    """Return a name such as "transX" for a name such as `JointDOF.TransX`."""
+    """Convert a name such as `JointDOF.TransX` to "transX"."""
     word = str(axis).rpartition(".")[2]
     return word[0].lower() + word[1:]

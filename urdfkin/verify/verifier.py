@@ -1,7 +1,7 @@
 """Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
 
-The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape, so it
-also finds errors in the conversion of a result to this shape.
+The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape, and
+therefore also finds errors in the conversion to this shape.
 """
 
 from __future__ import annotations
@@ -52,7 +52,6 @@ TABLE_SAMPLES = 40
 #: "sample": check `SAMPLE_SIZE` configurations of a call.
 Verify = bool | Literal["sample"]
 
-#: Number of configurations of a call that the policy "sample" checks.
 SAMPLE_SIZE = 100
 
 #: Maximum number of values that are compared at once.
@@ -79,7 +78,6 @@ class Verifier:
 
     Args:
         unverifiable: Reason why Pinocchio cannot check the robot.
-        oracle: Library that checks the methods' results.
 
     Attributes:
         source_notes: Text about the conversion to URDF.
@@ -108,10 +106,7 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle of the robot.
-
-        With `base`, the model has a free-flyer.
-        """
+        """Return the robot's oracle. With `base`, the oracle's model has a free-flyer."""
         key = library.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = library.make_oracle(
@@ -137,7 +132,7 @@ class Verifier:
         )
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
+        # Pinocchio may accept a robot with fewer moving joints, even if it refuses the original robot.
         known_refusal = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -152,7 +147,7 @@ class Verifier:
         return verifier
 
     def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
-        """Return why an oracle cannot check the robot, or None."""
+        """Return the reason why an oracle cannot check the robot, or None."""
         if library is PINOCCHIO and self.known_refusal is not None:
             return self.known_refusal
         if library.name not in self._refusals:
@@ -234,9 +229,8 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that calls `compute` and checks the result.
 
-        The returned function has the same arguments as `compute`. Their last argument is `out`. The function
-        returns None if `compute` does not support the arguments. If the oracle cannot check the robot, the
-        function always returns None.
+        Both functions have the same arguments; the last argument is `out`. The returned function returns None
+        if `compute` does not support the arguments, or if the oracle cannot check the robot.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -269,7 +263,6 @@ class Verifier:
     def _compare_part(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Compare the configurations `part` of a call with the oracle."""
         x = call.select(part)
         arguments = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = compare_with_oracle(*arguments)
@@ -314,9 +307,7 @@ class Verifier:
     # -- tables --------------------------------------------------------------------------------------
 
     def check_table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
-        """Check a Denavit-Hartenberg table.
-
-        None means that Pinocchio cannot check the robot.
+        """Check a Denavit-Hartenberg table. Return None if Pinocchio cannot check the robot.
 
         Raises:
             TableError: The table and Pinocchio differ by more than the bound.
@@ -341,9 +332,7 @@ class Verifier:
         return check
 
     def check_tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Check Khalil-Kleinfinger parameters with Pinocchio.
-
-        None means that Pinocchio cannot check the robot.
+        """Check Khalil-Kleinfinger parameters. Return None if Pinocchio cannot check the robot.
 
         Raises:
             TableError: The parameters and Pinocchio differ by more than the bound.
@@ -416,7 +405,7 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    With a fixed base and revolute joints, the bound of a quantity that depends only on q is constant.
+    The bound is constant if the quantity needs only q, the base is fixed and all joints are revolute.
     """
     v, a = (*x.rates, None, None)[:2]
     is_constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
@@ -446,10 +435,7 @@ def compute_oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch
 
 
 def yield_oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
-    """Yield an oracle's results in blocks.
-
-    Each block may overwrite the previous block.
-    """
+    """Yield blocks of results. Each block may overwrite the previous block."""
     assert quantity.blocks is not None
     return quantity.blocks(oracle, query)
 
@@ -469,8 +455,7 @@ def as_verify(verify: object) -> Verify:
 def split_into_parts(verify: Verify, n: int, values_per_configuration: int) -> Iterator[slice | IntArray]:
     """Split the checked configurations into parts, and yield the indices of each part.
 
-    With "sample", the configurations are random, because a regular choice may be biased.
-    `values_per_configuration` is the number of compared numbers for one configuration.
+    With "sample", the configurations are random, because equal steps could match a pattern in the batch.
     """
     step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, values_per_configuration)))
     if verify == "sample" and n > SAMPLE_SIZE:

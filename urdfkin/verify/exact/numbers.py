@@ -33,16 +33,13 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Number of decimal digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Number of decimal digits in calculations for a path without joints; each joint adds digits.
-#: A double has about 16 digits.
+#: Number of decimal digits of intervals on a path without joints (`enough_digits`).
 _BASE_DIGITS = 30
-#: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
-#: Number of bits in addition to the bits of the decimal digits.
-#: For example, an interval of 15 digits has 50 + 5 = 55 bits.
+#: An interval of 15 digits has 50 + 5 = 55 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
-#: Number of significant digits of a written decimal; 17 digits determine every double.
+#: A decimal of 17 digits determines every double.
 _SIGNIFICANT_DIGITS = 17
 #: Number of digits in `format_decimal` before the result is rounded to 17 digits.
 _INTERMEDIATE_DIGITS = 200
@@ -53,11 +50,10 @@ _precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joint_count: int) -> int:
-    """Return the number of decimal digits for intervals on a path with `joint_count` joints.
+    """Return the number of digits that makes an interval narrower than the last digit of a double.
 
-    With this number, an interval is narrower than the last digit of a double. A joint with an oblique axis
-    makes an interval about twice as wide. The digit that each joint adds makes the interval ten times
-    narrower.
+    A joint with an oblique axis makes an interval about twice as wide. Each joint therefore adds one digit,
+    which makes the interval ten times narrower.
     """
     return _BASE_DIGITS + joint_count
 
@@ -73,16 +69,12 @@ def precision(digits: int) -> Iterator[None]:
 
 
 def as_interval(value: Number) -> Number:
-    """Convert a value to an interval.
-
-    A double or an integer becomes an interval of width 0.
-    """
+    """Make an interval. The interval of a double or an integer has width 0."""
     return arb(value)
 
 
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return both ends, rounded outward to doubles."""
-    # An integer is exact and needs no rounding.
     # This shortcut saves time, because x is usually the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
@@ -159,7 +151,7 @@ def rotation_from_rpy(rpy: Vector, kind: NumberType = INTERVALS) -> Matrix:
 
 
 def rotation_from_quaternion(quaternion: Sequence[Number], kind: NumberType = INTERVALS) -> Matrix:
-    """Return the rotation of any quaternion (x, y, z, w)."""
+    """Return the rotation of a quaternion (x, y, z, w) of any length."""
     length = kind.root(sum(x * x for x in quaternion))
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
     return found
@@ -222,7 +214,6 @@ class ExactJoint:
 def read_exact_joints(
     text: str, tree: KinematicTree, joint_indices: Iterable[int] | None = None, kind: NumberType = INTERVALS
 ) -> dict[int, ExactJoint]:
-    """Read the exact numbers of joints."""
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if joint_indices is None else joint_indices
     return {i: exact_text.read_joint(tree.joints[i], tree.name) for i in indices}
@@ -232,8 +223,7 @@ def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: Fl
     return _ExactText(text).conversion_errors(tree, path, q)
 
 
-# The cache avoids parsing the same URDF twice.
-# Parsing a large URDF is slower than computing one sample.
+# The last URDF is cached, because parsing a large URDF is slower than computing one sample.
 @lru_cache(maxsize=1)
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = INTERVALS) -> None:
@@ -291,7 +281,7 @@ class _ExactText:
         return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
     def resolve_rule(self, name: str) -> tuple[Number, Number]:
-        """Return M and C: the joint's value is M q + C, with q of the independent joint."""
+        """Return M and C of the joint's value M q + C, with q of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -336,10 +326,7 @@ class _ExactText:
         return DecimalErrors(angles, rules, np.array(lengths))
 
     def bound_value(self, name: str, values: Mapping[str, Any]) -> _ValueBound:
-        """Bound a joint's value and rounding error.
-
-        `values` contains the values of the independent joints.
-        """
+        """Bound a joint's value, given the values of the independent joints."""
         rule = self.elements[name].find("mimic")
         if rule is None or name in values:
             return _ValueBound(abs(values[name]), 0.0, 0.0, 0)

@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7, computed with intervals that contain the true values.
 
 The inputs are the URDF's decimals and the exact values of q, v and a. The equations come from
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals are used to measure rounding
-errors. The comparison with Pinocchio checks the equations.
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure only rounding errors;
+the comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
@@ -64,10 +64,7 @@ def compute_motion(
     *,
     base: LinkState | None = None,
 ) -> ExactMotion:
-    """Compute the motion of the links for one sample.
-
-    In `joints`, each joint comes after its parent joint.
-    """
+    """Compute the motion for one sample. In `joints`, each joint comes after its parent joint."""
     q, v, a = (list(map(as_interval, numbers)) for numbers in (q, v, a))
     states = {0: base or LinkState()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
@@ -127,10 +124,9 @@ def acceleration_values(motion: ExactMotion, link: int, reference: Reference) ->
 
 
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the spatial acceleration of a link.
+    """Return the spatial acceleration.
 
-    At the link's origin, the linear part is acc - w x vel. At the world's origin (WORLD), it is
-    acc - w x vel - alpha x p.
+    The linear part is acc - w x vel, or acc - w x vel - alpha x p for WORLD.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
