@@ -70,11 +70,7 @@ _THOUSANDS = re.compile(r"(?<![0-9.,])[1-9][0-9]{0,2}(,[0-9]{3})+(?![0-9,])")
 
 
 def find_table_in_text(text: str) -> dict[str, Any]:
-    """Find a table in a text.
-
-    Returns:
-        Plain data for `table_from_mapping`.
-    """
+    """Find a table in a text; return plain data for `table_from_mapping`."""
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_parse_latex, _parse_bars, _parse_separated, _parse_aligned):
         if (grid := form(lines)) is not None:
@@ -122,7 +118,6 @@ class _Grid:
     Attributes:
         other_lines: Lines outside the table.
         decimal_commas: Whether a comma in a number can be a decimal comma.
-        rejects_unknown_columns: Whether an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
