@@ -115,15 +115,13 @@ class _Column:
 class _Grid:
     """The cells of a table.
 
-    Attributes:
-        other_lines: Lines outside the table.
-        decimal_commas: Whether a comma in a number can be a decimal comma.
+    `other_lines` are the lines outside the table.
     """
 
     columns: tuple[_Column, ...]
     rows: list[list[str]]
     other_lines: list[str]
-    decimal_commas: bool = False
+    decimal_commas: bool = False  # Decimal commas are possible.
     rejects_unknown_columns: bool = False
 
     @property
@@ -244,7 +242,6 @@ def _parse_aligned(lines: list[str]) -> _Grid | None:
 
 
 def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Return None if a required column is missing."""
     columns = tuple(map(_parse_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in COLUMNS):
@@ -287,7 +284,7 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """A heading with the index i-1 means "modified". A text with the names of both conventions gives None."""
+    """A heading with the index i-1 means "modified"."""
     if any(column.previous for column in grid.columns):
         return "modified"
     text = "\n".join(map(to_plain_text, grid.other_lines))
@@ -391,7 +388,7 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace another joint's variable by a mimic rule.
 
-    Variable qi belongs to the i-th joint in `coordinates`. If `coordinates` is empty, it belongs to row i.
+    Variable qi belongs to the i-th joint in `coordinates`, or to row i if `coordinates` is empty.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]

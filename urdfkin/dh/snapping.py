@@ -43,8 +43,7 @@ MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: `find_noisy_cells` ignores angles farther than this number (rad) from a multiple of 15 degrees.
-#: The function also ignores lengths above this number times the table's span.
+#: Noise is at most this number (rad, or metres per metre of the table's span).
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 

@@ -39,8 +39,7 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Singular values below this number are treated as zero.
-#: The rounding errors of singular values are much smaller.
+#: Singular values below this number count as zero. Their rounding errors are much smaller.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
 #: Default tolerance of `find_opw` (metres and rad).

@@ -195,10 +195,7 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
 class _LinkAxis:
     """The axis frame of a link.
 
-    Attributes:
-        T_antecedent_axis: Pose in the antecedent's axis frame.
-        T_link_axis: Pose in the link's URDF frame.
-        zeroed_tilt: Sum (rad) of the zeroed tilts along the path from the root.
+    `zeroed_tilt` is the sum (rad) of the zeroed tilts along the path from the root.
     """
 
     antecedent: int

@@ -34,10 +34,7 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Each difference from the interpretation that the file states has this cost (metres):
-#: `cost = _DIFFERENCE_COST_RATIO * min(D) + tolerance`
-#: D is the sum of |shape of the table - shape of the URDF|.
-#: The minimum is over all other interpretations with the URDF's joint kinds.
+#: Cost of a difference from the file's interpretation, as a fraction of the smallest shape difference.
 _DIFFERENCE_COST_RATIO = 0.1
 #: A tip error within the tolerance ends the search for a better interpretation.
 #: A larger tip error must be at most this fraction of the smaller of two lengths.
@@ -220,10 +217,7 @@ class Interpretation:
         return table_from_mapping({**rest, **stated, "rows": rows})
 
     def difference_count(self, other: Interpretation) -> int:
-        """Count the differences between two interpretations.
-
-        Two exchanged columns are one difference.
-        """
+        """Count the differences; two exchanged columns are one difference."""
         columns = sum(
             column != expected for column, expected in zip(self.columns, other.columns, strict=True)
         )

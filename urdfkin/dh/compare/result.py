@@ -185,10 +185,7 @@ class TableComparison:
 
     @property
     def rounding_error(self) -> float:
-        """Largest tip error due to rounding.
-
-        Unit: rad, or m per m of reach and travel.
-        """
+        """Largest tip error due to rounding (rad, or m per m of reach and travel)."""
         return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
     @property
@@ -198,10 +195,7 @@ class TableComparison:
 
     @property
     def resolution(self) -> float:
-        """Rounding step of fitted numbers.
-
-        Unit: rad, or m per m of reach.
-        """
+        """Rounding step of fitted numbers (rad, or m per m of reach)."""
         return fit_resolution(self.metres / self.reach, self.radians)
 
     @property
@@ -429,10 +423,7 @@ def _difference_table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Round an offset to a multiple of `fine`, and format the offset.
-
-    An angle within `fine` of a multiple of 15 degrees becomes this multiple.
-    """
+    """Format an offset, rounded to a multiple of `fine`, or to a multiple of 15 degrees within `fine`."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

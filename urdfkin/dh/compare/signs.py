@@ -67,21 +67,17 @@ class SignFit:
 class _PartialAlignment:
     """Signs and offsets with which the first joints of a path match the first rows of a table.
 
-    Attributes:
-        cost: Weighted difference of cells, plus the cost of reversed joints, m.
-        offsets: Joint offsets without the last.
-        phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
-        delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
-        free_offset: A joint offset that can be chosen freely: index of its row, and the sign 1 or -1.
-            If the sign is -1, an increase of this offset rotates the axis x about -z.
+    Rz(phi_in) Tz(delta_in) leads from the last joint's DH frame to its URDF frame.
     """
 
-    cost: float
+    cost: float  # Weighted difference of cells, plus the cost of reversed joints (m).
     senses: tuple[int, ...]
-    offsets: tuple[float, ...]
+    offsets: tuple[float, ...]  # The last joint's offset is missing.
     phi_in: float
     delta_in: float
     base: FloatArray
+    #: Row index of a joint offset that can be chosen freely, and a sign.
+    #: With sign -1, an increase of this offset rotates the axis x about -z.
     free_offset: tuple[int, float] | None = None
 
 

@@ -30,8 +30,7 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: Printed bounds are multiplied by this factor, and rounded up.
-#: Without the factor, a tiny rounding error of a bound could increase the last digit by 1.
+#: With this factor, a tiny rounding error of a bound does not increase the last digit when rounding up.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
