@@ -1,8 +1,7 @@
 """Compute the transform between two consecutive joint axes.
 
-Usually, the transform is along the common normal of the axes. The z axis of each joint frame is the joint's
-axis. Let A be the constant pose of the next joint's frame in this joint's frame. `find_axis_transform` writes
-A as a product:
+The z axis of each joint frame is the joint's axis. Let A be the constant pose of the next joint's frame in
+this joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
@@ -254,7 +253,7 @@ class PairWithReference:
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return the transforms of pairs, and theta of each pair's first joint, with cells as in the reference.
+    """Match the reference's cells; return the transform and the first joint's theta of each pair.
 
     Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint. `tip_offset` is the required `delta_in` of
     the last joint, or None if any `delta_in` is allowed.

@@ -97,18 +97,12 @@ def find_table_in_text(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """Content of a heading.
+    """Content of a heading."""
 
-    Attributes:
-        name: Standard name of the column; "" for an unknown heading.
-        heading: The heading without unit and index, in lower case.
-        previous: Whether the heading has the index i-1.
-    """
-
-    name: str
-    heading: str = ""
+    name: str  # Standard name of the column; "" for an unknown heading.
+    heading: str = ""  # Lower case, without unit and index.
     unit: str | None = None
-    previous: bool = False
+    previous: bool = False  # The heading has the index i-1.
 
 
 @dataclass(frozen=True, slots=True)
@@ -520,7 +514,6 @@ def published_tables() -> dict[str, Path]:
 
 
 def suggest_published_tables(robot: str) -> list[str]:
-    """Recommend published tables of a robot."""
     lines = []
     for name, path in published_tables().items():
         data = read_mapping(path)

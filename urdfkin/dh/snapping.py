@@ -7,8 +7,8 @@ of angles are snapped:
 2. the tilt between consecutive axes, and the rotations about these axes;
 3. theta of each row of the derived table.
 
-A changed angle rotates the rest of the chain about the origin of one joint. `SnapReport` contains a bound of
-the tip's displacement.
+A changed angle rotates the rest of the chain about the origin of one joint. This gives a bound of the tip's
+displacement.
 """
 
 from __future__ import annotations

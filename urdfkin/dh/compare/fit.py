@@ -67,8 +67,8 @@ _EXACT_TIP_ERROR = 1e-12
 _OTHER_SIGNS_ERROR_RATIO = 0.5
 #: A table with fitted translations is a start table if its tip error is at most this fraction of the reach.
 _CLOSE_START = 1e-6
-#: Large changes (rad) of two consecutive joint offsets: theta_i increases, and theta_{i+1} decreases.
-#: If cos(alpha_i) < 0, the axes point in opposite directions, and both offsets increase.
+#: Large changes (rad), which the fit adds to theta_i and subtracts from theta_{i+1}.
+#: If cos(alpha_i) < 0, the axes point in opposite directions, and the fit adds the change to both.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: `count` and `beam_width` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)

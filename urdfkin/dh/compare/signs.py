@@ -34,7 +34,7 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: Cost (m) of a joint with sign -1, so that the URDF's joint signs win if alignments fit equally well.
+#: Cost (m) of a joint with sign -1, so that of equally good alignments, the URDF's joint signs are chosen.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _NEAR_PRISMATIC_WEIGHT = 1e-3
