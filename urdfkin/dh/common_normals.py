@@ -1,22 +1,20 @@
 """Compute the transform between two consecutive joint axes.
 
-Usually, the transform is along the common normal of the axes. The z axis of each joint frame is the joint's
-axis. Let A be the constant pose of the next joint's frame in this joint's frame. `find_axis_transform` writes
-A as a product:
+The z axis of each joint frame is the joint's axis. Let A be the constant pose of the next joint's frame in
+this joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-Rz(phi) rotates about the first joint's axis, and Tz(delta) translates along this axis. Both motions commute
-with the motion of the first joint, so phi and delta are parts of theta and d in the first joint's row.
-Likewise, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes that are
-not nearly parallel, beta is 0, and the x axis has two possible directions. For each direction of x, the six
-numbers other than beta are unique (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and
-for nearly parallel axes.
+Rz(phi) Tz(delta) commutes with the motion of the first joint, so phi and delta are parts of theta and d in
+the first joint's row. Likewise, phi_next and delta_next are parts of theta and d in the second joint's row.
+For skew axes that are not nearly parallel, beta is 0, and the x axis has two possible directions. For each
+direction of x, the six numbers other than beta are unique (Denavit and Hartenberg). docs/dh.md explains the
+numbers for parallel and for nearly parallel axes.
 
-For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
-pose determines only the sum of the angles theta. `match_axis_transforms` copies d of parallel axes and theta
-of coinciding axes from a reference table. In one row, d or theta is computed from the sum. In a Hayati row,
-any d is possible, because the axes do not determine d.
+For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the pose
+determines only the sum of the angles theta. `match_axis_transforms` copies these cells from a reference
+table, except one cell that is computed from the sum. In a Hayati row, any d is possible, because the axes do
+not determine d.
 """
 
 from __future__ import annotations
@@ -94,10 +92,9 @@ def find_axis_transform(
 ) -> AxisTransform:
     """Factor the transform A between two axes.
 
-    `reach` is the length of the path (m). Tilts and lengths up to `noise` count as rounding errors, and
-    become zero. `default_phi` is used if the axes do not determine phi. For parallel axes, one of the numbers
-    `delta` and `delta_next` contains the whole offset, and the other number is 0. By default, `delta_next`
-    contains the offset. With `offset_in_delta`, `delta` contains the offset.
+    `reach` is the length of the path (m). Tilts and lengths up to `noise` become zero. `default_phi` is used
+    if the axes do not determine phi. For parallel axes, `delta_next` contains the whole offset, unless
+    `offset_in_delta` is true.
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_sine(A)
@@ -181,8 +178,7 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
 class PairWithReference:
     """A pair of consecutive joint axes, and the reference table's row of the first joint.
 
-    `A` is the (4, 4) pose of the next joint's frame in this joint's frame. The argument `delta_in` of a
-    method is the offset (m) from the first joint's DH frame to its joint frame.
+    The argument `delta_in` of a method is the offset (m) from the first joint's DH frame to its joint frame.
     """
 
     A: FloatArray
@@ -216,8 +212,7 @@ class PairWithReference:
     def hayati_offset(self) -> float | None:
         """Value of z (m) in this joint's frame where a Hayati row's x axis intersects the joint's axis.
 
-        With this value, the cell a equals the reference. The value is None if the axes are parallel in the
-        path or in the reference, or if the absolute value exceeds the reach.
+        With this value, the cell a equals the reference.
 
             p: origin of the next joint's frame
             t: unit vector along the projection of the next axis onto the xy plane
@@ -240,7 +235,7 @@ class PairWithReference:
         return offset if abs(offset) <= self.reach else None
 
     def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
-        """Return the transform for the offset `d` (m). If the axes determine the offset, `d` is ignored."""
+        """Return the transform; the offset `d` (m) is ignored if the axes determine the offset."""
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
             return find_axis_transform(A, self.reach, default_phi, hayati=False, noise=self.noise)
@@ -252,20 +247,16 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def delta_in_for_zero_d(self, delta_next: float) -> float:
-        """Return the offset `delta_in` (m) with which d of this row is 0."""
         return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
 
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Match the reference table's cells.
+    """Match the reference's cells; return the transform and the first joint's theta of each pair.
 
     Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint. `tip_offset` is the required `delta_in` of
-    the last joint. If `tip_offset` is None, any `delta_in` is allowed.
-
-    Returns:
-        The transform of each pair, and theta of each pair's first joint.
+    the last joint, or None if any `delta_in` is allowed.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -304,8 +295,8 @@ def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_o
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # Of the rows i to end - 1, the code selects the row with the most tilted axes. If this is a Hayati
-        # row, d of row i is chosen so that the cell a of the Hayati row gets its reference value.
+        # Therefore, d can be chosen so that the cell a of one Hayati row equals the reference.
+        # This row is the row with the most tilted axes.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -323,9 +314,9 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    There is one exception. Joint i is revolute or the first joint, prismatic joints i + 1 to k follow, and of
-    these joints' rows the axes determine phi only in row k. In this case, theta of rows i + 1 to k equals the
-    reference instead.
+    A revolute joint or the base can compensate for a different theta, but a prismatic joint cannot. If
+    prismatic joints i + 1 to k follow, and only row k determines phi, theta of rows i + 1 to k therefore
+    equals the reference instead.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:

@@ -114,10 +114,7 @@ def _serial_joints(
 
 
 def relative_frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return each frame's pose in the previous frame.
-
-    The last frame is the tip. All joints are at zero.
-    """
+    """Return the pose of each frame, and of the tip, in the previous frame, with all joints at zero."""
     if not table.rows:
         return [table.base @ table.tool]
     if table.convention is DHConvention.STANDARD:

@@ -81,9 +81,8 @@ class DerivationOptions:
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
     """Derive a table from a chain.
 
-    `like` is a standard table of the same joints.
-    With `like`, `options.sign` has no effect.
-    With `like`, `options.parallel_offset` has an effect only if it is "first".
+    `like` is a standard table of the same joints. With `like`, `options.sign` has no effect, and
+    `options.parallel_offset` has an effect only if it is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -190,10 +189,9 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift the axis of the prismatic joint k if a neighbouring axis is nearly parallel.
+    """Shift the axis of the prismatic joint k to the origin of a neighbour with a nearly parallel axis.
 
-    The shifted axis passes through the neighbouring joint's origin. Without the shift, the common normal of
-    the two axes could be far away from the robot.
+    Without the shift, the common normal of the two axes could be far away from the robot.
     """
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
@@ -219,11 +217,7 @@ def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
 
 
 def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
-    """Rz(phi) Tz(delta) leads from frame 0 to joint 1.
-
-    Returns:
-        T_base_0, phi (rad) and delta (m).
-    """
+    """Return T_base_0, phi (rad) and delta (m); Rz(phi) Tz(delta) leads from frame 0 to joint 1."""
     z, p = A[:3, 2], A[:3, 3]
     offset = clean_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
@@ -315,7 +309,7 @@ def _match_last_row(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Copy theta, a, alpha and a zero d from the reference, and adjust the tool.
 
-    Nothing is copied if both tables have no tool and their thetas differ by less than 1e-3 rad.
+    Nothing is copied if both tables have no tool and nearly equal thetas.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)

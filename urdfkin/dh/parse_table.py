@@ -70,11 +70,7 @@ _THOUSANDS = re.compile(r"(?<![0-9.,])[1-9][0-9]{0,2}(,[0-9]{3})+(?![0-9,])")
 
 
 def find_table_in_text(text: str) -> dict[str, Any]:
-    """Find a table in a text.
-
-    Returns:
-        Plain data for `table_from_mapping`.
-    """
+    """Find a table in a text; return plain data for `table_from_mapping`."""
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_parse_latex, _parse_bars, _parse_separated, _parse_aligned):
         if (grid := form(lines)) is not None:
@@ -101,34 +97,25 @@ def find_table_in_text(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """Content of a heading.
+    """Content of a heading."""
 
-    Attributes:
-        name: Standard name of the column; "" for an unknown heading.
-        heading: The heading without unit and index, in lower case.
-        previous: Whether the heading has the index i-1.
-    """
-
-    name: str
-    heading: str = ""
+    name: str  # Standard name of the column; "" for an unknown heading.
+    heading: str = ""  # Lower case, without unit and index.
     unit: str | None = None
-    previous: bool = False
+    previous: bool = False  # The heading has the index i-1.
 
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
     """The cells of a table.
 
-    Attributes:
-        other_lines: Lines outside the table.
-        decimal_commas: Whether a comma in a number can be a decimal comma.
-        rejects_unknown_columns: Whether an unknown column is an error.
+    `other_lines` are the lines outside the table.
     """
 
     columns: tuple[_Column, ...]
     rows: list[list[str]]
     other_lines: list[str]
-    decimal_commas: bool = False
+    decimal_commas: bool = False  # Decimal commas are possible.
     rejects_unknown_columns: bool = False
 
     @property
@@ -249,7 +236,6 @@ def _parse_aligned(lines: list[str]) -> _Grid | None:
 
 
 def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Return None if a required column is missing."""
     columns = tuple(map(_parse_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in COLUMNS):
@@ -292,7 +278,7 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """A heading with the index i-1 means "modified". A text with the names of both conventions gives None."""
+    """A heading with the index i-1 means "modified"."""
     if any(column.previous for column in grid.columns):
         return "modified"
     text = "\n".join(map(to_plain_text, grid.other_lines))
@@ -396,7 +382,7 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace another joint's variable by a mimic rule.
 
-    Variable qi belongs to the i-th joint in `coordinates`. If `coordinates` is empty, it belongs to row i.
+    Variable qi belongs to the i-th joint in `coordinates`, or to row i if `coordinates` is empty.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -528,7 +514,6 @@ def published_tables() -> dict[str, Path]:
 
 
 def suggest_published_tables(robot: str) -> list[str]:
-    """Recommend published tables of a robot."""
     lines = []
     for name, path in published_tables().items():
         data = read_mapping(path)

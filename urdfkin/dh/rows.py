@@ -139,8 +139,7 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_column_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    A column of angles usually contains multiples of 15 degrees. In radians, these are multiples of pi/12.
-    A length other than 0 is rarely a multiple of 15 or of pi/12.
+    Angles are usually multiples of 15 degrees or of pi/12. Lengths other than 0 rarely are.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_list_form(row) for row in lists):

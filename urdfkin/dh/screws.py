@@ -42,10 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws and of M.
-#: The length of an axis vector may differ from 1 by this number.
-#: The pitch (m/rad) of a screw may differ from 0 by this number.
-#: For the rotation matrix R in M, the entries of R R^T may differ from the identity by this number.
+#: Tolerance of handwritten numbers: the length of an axis, a pitch (m/rad), and the entries of R R^T - I.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 

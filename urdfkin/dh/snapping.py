@@ -1,14 +1,14 @@
 """Snap angles to multiples of 15 degrees, and compute the effect on the tip.
 
-To snap an angle means to replace the angle by the nearest multiple of 15 degrees. An angle is snapped only if
-the change is at most the tolerance. Three kinds of angles are snapped:
+An angle is replaced by the nearest multiple of 15 degrees if the change is at most the tolerance. Three kinds
+of angles are snapped:
 
 1. roll, pitch and yaw of each joint's origin in the URDF;
 2. the tilt between consecutive axes, and the rotations about these axes;
 3. theta of each row of the derived table.
 
-A changed angle rotates the rest of the chain about the origin of one joint. `SnapReport` contains a bound of
-the tip's displacement.
+A changed angle rotates the rest of the chain about the origin of one joint. This gives a bound of the tip's
+displacement.
 """
 
 from __future__ import annotations
@@ -43,8 +43,7 @@ MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: `find_noisy_cells` ignores angles farther than this number (rad) from a multiple of 15 degrees.
-#: The function also ignores lengths above this number times the table's span.
+#: Noise is at most this number (rad, or metres per metre of the table's span).
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
@@ -61,11 +60,7 @@ def check_snap_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Snap the angles of a chain.
-
-    Returns:
-        The snapped chain, and a pair (k, change) for each changed pose A_k.
-    """
+    """Return the snapped chain, and a pair (k, change) for each changed pose A_k."""
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = make_chain(snapped_tree, tip, base)
@@ -166,11 +161,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Snap the angles of Rz(phi) Rx(tilt) Rz(psi).
-
-    Returns:
-        The new pose, and the angle (rad) between the old and the new rotation.
-    """
+    """Snap the angles of Rz(phi) Rx(tilt) Rz(psi); return the new pose and the change (rad)."""
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
@@ -224,19 +215,13 @@ def _changes_of_origins(
 
 
 def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Describe a rotation of the rest of the chain about the origin of joint k.
-
-    The base has k = 0, the first joint has k = 1, and the tip has k = n + 1.
-    """
+    """Describe a rotation of the rest of the chain about the origin of joint k (the base has k = 0)."""
     prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the index of the row that contains A_k.
-
-    The base has the index -1, and the tool has the index n.
-    """
+    """Return the index of the row that contains A_k: -1 for the base, n for the tool."""
     n = len(table.rows)
     if k == 0:
         return -1
@@ -246,11 +231,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
 
 
 def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Find angles near multiples of 15 degrees, and lengths near 0.
-
-    Returns:
-        (joint, cell, deviation) tuples.
-    """
+    """Return (joint, cell, deviation) of angles near multiples of 15 degrees, and of lengths near 0."""
     noisy = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
@@ -264,7 +245,7 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def travel_condition(table: DHTable) -> str:
-    """Return the condition under which a bound on the tip's displacement holds, or "" without a condition."""
+    """Return the condition of a bound on the tip's displacement, or "" without a condition."""
     condition = "prismatic joints are within their limits"
     if all(row.kind.turns for row in table.rows):
         return ""

@@ -39,8 +39,7 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Singular values below this number are treated as zero.
-#: The rounding errors of singular values are much smaller.
+#: Singular values below this number count as zero. Their rounding errors are much smaller.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
 #: Default tolerance of `find_opw` (metres and rad).
@@ -166,11 +165,7 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes.
-
-    Returns:
-        The point (3,), and the largest distance (m) between the point and an axis.
-    """
+    """Return the least-squares intersection of axes, and its largest distance (m) from an axis."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -266,9 +261,8 @@ def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Bound the distance between `origin` and the tip.
 
-    The points p_0 to p_n lead from `origin` to the last revolute axis. Each point p_i is the point of the
-    next revolute axis that is nearest to p_{i-1}. The bound is the sum of the distances between consecutive
-    points, the distance between p_n and the tip, and the travel of the prismatic joints.
+    The bound is the length of a polyline from `origin` to the tip, plus the travel of the prismatic joints.
+    The polyline has a corner on each revolute axis, at the point nearest to the previous corner.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -283,11 +277,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Sample tip positions without mimic rules.
-
-    Returns:
-        The tip positions at all samples, and the Jacobian at the first sample.
-    """
+    """Return sampled tip positions, and the Jacobian at the first sample; mimic rules are ignored."""
     ranges = [joint_value_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
@@ -312,12 +302,7 @@ class OpwParameters:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return the pose of the tip in the base frame.
-
-        F is the solver's forward kinematics, and the pose is:
-
-        `base F(sign * q - offset) tool`
-        """
+        """Return the tip's pose `base F(sign * q - offset) tool`; F is the solver's forward kinematics."""
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
@@ -389,10 +374,7 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
 
 
 def _opw_candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield an OPW table for each choice of the signs of a1, a2 and b.
-
-    The lengths are approximate.
-    """
+    """Yield an OPW table with approximate lengths for each choice of the signs of a1, a2 and b."""
     rows = derive(path, DerivationOptions(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
@@ -418,24 +400,18 @@ def _read_parameters(table: DHTable) -> OpwParameters:
 
 
 def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the axes h_i and the vectors P_i.
+    """Return the axes h_i (n, 3) and the vectors P_i (n + 1, 3), m, of an arm with revolute joints.
 
-    All joints must be revolute.
-    The vector P_0 begins at the base's origin, and P_n ends at the tip's origin.
-    The vector between two intersecting axes is exactly zero, because solvers test for zero.
-
-    Returns:
-        (n, 3) unit axes, and (n + 1, 3) vectors, m.
+    Intersecting axes share a point if possible, because solvers test whether a vector is exactly zero.
     """
     points = np.vstack([np.zeros(3), _choose_axis_points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
 
 
 def _choose_axis_points(screws: ProductOfExponentials) -> FloatArray:
-    """Return a point of each axis; intersecting axes have the same point.
+    """Return a point of each axis; consecutive axes that intersect share a point if possible.
 
-    An intersection of three axes has priority over an intersection of two axes. Among intersections of the
-    same number of axes, the last one on the path has priority.
+    Intersections of three axes have priority over those of two axes, and later ones over earlier ones.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

@@ -162,8 +162,7 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: An angle looks round if it is near a nonzero multiple of 15 degrees.
-#: The largest difference is this number times 15 degrees.
+#: Largest distance between a round angle and a multiple of 15 degrees, as a fraction of 15 degrees.
 _ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6

@@ -195,10 +195,7 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
 class _LinkAxis:
     """The axis frame of a link.
 
-    Attributes:
-        T_antecedent_axis: Pose in the antecedent's axis frame.
-        T_link_axis: Pose in the link's URDF frame.
-        zeroed_tilt: Sum (rad) of the zeroed tilts along the path from the root.
+    `zeroed_tilt` is the sum (rad) of the zeroed tilts along the path from the root.
     """
 
     antecedent: int
@@ -209,10 +206,10 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return the axis frame of each link. If the link's joint is fixed, this is the link's URDF frame."""
+    """Return the axis frame of each link, or the link's URDF frame if the link's joint is fixed."""
     links = list[_LinkAxis]()
-    # Each link has an entry: an index i, the pose T_i_link, and the number of fixed joints from link i to the
-    # link. For a moving link, i is the link's own index. For all other links, i is the antecedent's index.
+    # Each entry is an index i, the pose T_i_link, and the number of fixed joints from link i to the link.
+    # For a moving link, i is the link's own index. For all other links, i is the antecedent's index.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -229,12 +226,9 @@ def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis
 def _find_transforms(
     tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
-    """Return the transforms between consecutive axes, and the offsets of the row frames.
+    """Return the transforms between consecutive axes, and (phi, delta) by link.
 
     A row's frame has the pose Rz(phi) Tz(delta) in the link's axis frame.
-
-    Returns:
-        The transforms, and (phi, delta) by link.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):

@@ -266,11 +266,7 @@ def parse_cell(original: str) -> Cell:
 
 @dataclass(slots=True)
 class _Term:
-    """A term of a cell's sum.
-
-    Attributes:
-        operator: "*" or "/" at the end of the term so far, or an empty string.
-    """
+    """A term of a cell's sum."""
 
     sign: float = 1.0
     size: float | None = None
@@ -278,7 +274,7 @@ class _Term:
     units: tuple[str, ...] = ()
     has_pi: bool = False
     text: str = ""
-    operator: str = ""
+    operator: str = ""  # "*" or "/" at the end of the term so far.
 
     @property
     def value(self) -> float:

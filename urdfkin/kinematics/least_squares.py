@@ -46,7 +46,7 @@ def least_squares(
         derivatives: Computes the negative derivatives (n, parameters) of the residuals.
         move: Applies a step (parameters,) to a state and returns the new state.
         max_step: Upper bound on the absolute value of each component of a step.
-        patience: Largest number of consecutive slow steps. 0 means no limit.
+        patience: The search ends after this number of consecutive slow steps. 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

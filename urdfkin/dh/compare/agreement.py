@@ -41,19 +41,15 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: A comparison corrects the differing cells, and computes the remaining tip error.
-#: It reports the cells if the correction reduces the tip error to at most this fraction.
-#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
+#: Differing cells are reported if their correction reduces the tip error to at most this fraction.
+#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach also suffices.
 _MAX_CELLS_ERROR_FRACTION = 0.5
-#: If a table does not agree with the URDF, urdfkin searches for a mistake in the table.
-#: A correction of the mistake is accepted if the corrected table agrees with the URDF.
-#: Otherwise, the correction must reduce the tip error to at most this fraction.
+#: The correction of a mistake must reduce the tip error to the tolerance, or to at most this fraction.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: More cells can differ without a fit than after a fit.
-#: If the additional cells exceed this number, no cells are reported for the comparison without a fit.
+#: Without a fit, more cells can differ than after a fit.
+#: The cells are reported only if at most this number of additional cells differ.
 _MAX_MORE_UNFITTED_CELLS = 2
-#: The reach is computed from the positions of the tip.
 #: If the tip moves by at most this fraction of the path length, the path length is the reach.
 _FIXED_TIP_SPREAD = 1e-6
 #: Half a unit of each cell's last digit, in metres or radians.
@@ -128,7 +124,7 @@ def compare(
 def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
     """Return the largest tip errors (m, rad) on samples after a fast fit.
 
-    The fit tries no further joint signs if metres + reach * radians <= `target_error` (m).
+    The fit ends if metres + reach * radians <= `target_error` (m).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -137,10 +133,9 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach, m.
+    """Return the robot's reach (m).
 
-    The path length can be far larger than the reach. For example, a URDF made from a table without Hayati
-    rows may contain offsets of kilometres.
+    The path length can be far larger, because tables without Hayati rows may have offsets of kilometres.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -203,17 +198,16 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains a cell of standard row i.
+    """Return the index of the reference row that contains a cell of standard row i, or None.
 
-    In a modified table, a, alpha and beta of standard row i are in the next row. For the last standard row,
-    no such row exists, and the result is None.
+    In a modified table, a, alpha and beta of standard row i are in the next row.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Return an array (n, 5) with 1 for each cell of a standard table that the reference contains, else 0."""
+    """Return an array (n, 5) with 1 for each standard cell that the reference contains, else 0."""
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
@@ -223,11 +217,7 @@ def _cell_mask(reference: DHTable) -> FloatArray:
 def _find_compensated_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Find the cells with errors that a fit compensates.
-
-    Returns:
-        Row index and name of each cell.
-    """
+    """Return row index and name of each cell with an error that a fit compensates."""
     compensated = []
     for i, k in find_compensated_cells(fitted, check_targets):
         reference_index = _reference_row_index(reference, i, CELLS[k])
@@ -303,11 +293,10 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 
 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
-    """Return bounds (m, rad) of the tip error.
+    """Return bounds (m, rad) of the tip error, without rounding errors and mimic rules.
 
-    The bounds exclude rounding errors. Mimic rules are ignored. The bounds hold for all angles, and for
-    displacements within the limits. For a prismatic joint without a range (`has_range`), the limits are
-    -`ASSUMED_LIMIT` and `ASSUMED_LIMIT`.
+    The bounds hold for all angles, and for displacements within the limits. For a prismatic joint without a
+    range (`has_range`), the limits are -`ASSUMED_LIMIT` and `ASSUMED_LIMIT`.
     """
     mechanisms = Mechanism(_make_tree_without_mimic(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -318,10 +307,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_tree_without_mimic(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Convert a path to a tree without mimic rules.
-
-    Links have the table's names.
-    """
+    """Convert a path to a tree without mimic rules, with the table's link names."""
     travels, z = _prismatic_ranges(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:

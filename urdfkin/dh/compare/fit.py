@@ -5,12 +5,12 @@
 | first | free parameters: base, tool and joint offsets |
 | second | free parameters, and as few cells as possible |
 
-Least squares finds small changes that cancel the tip error. Changes of different cells can often cancel the
-same error. The second fit therefore uses reweighted least squares, which change few cells.
+Changes of different cells can often cancel the same tip error. The second fit therefore uses reweighted least
+squares, which change few cells.
 
-If two joint axes nearly coincide, the tip hardly moves if one joint offset increases and the other decreases.
-When the error no longer decreases, `fit_free_parameters` therefore changes two consecutive joint offsets by a
-large angle. The fit then continues.
+If two joint axes nearly coincide, changes of their joint offsets can cancel at the tip. When the error no
+longer decreases, `fit_free_parameters` therefore changes two consecutive offsets by a large angle, and fits
+again.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ _IS_ANGLE = np.array([motion.turns for motion in _CELL_MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: Let s be the number of samples. The fit of the cells has converged if two conditions hold.
-#: The norm of the 6 s errors no longer decreases, and is at most 6 s * reach * this number.
+#: The fit of the cells ends if the norm of the errors no longer decreases, and is below a limit.
+#: For s samples, the limit is 6 s * reach * this number.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -54,27 +54,23 @@ _MIN_WEIGHT = 1e-9
 #: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
 #: Two cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_CELL_WEIGHT = 1.2
-#: The first number is the initial weight of every cell in the column beta.
-#: At each reweighting, the weights of the column beta are multiplied by the second number.
-#: Both numbers are below 1. Therefore, the fit changes alpha first, and beta only if necessary.
+#: Initial weight of the column beta, and factor of this weight at each reweighting.
+#: Both numbers are below 1, so the fit changes beta only if a change of alpha does not suffice.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: The fit tries large changes of joint offsets only if the root mean square error exceeds this fraction of
-#: the reach.
+#: Large changes of joint offsets are tried only if the RMS error exceeds this fraction of the reach.
 _EXACT_FIT_ERROR = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _EXACT_TIP_ERROR = 1e-12
-#: A fit with other joint signs is accepted only if its tip error is less than this fraction of the
-#: smallest earlier tip error.
+#: A fit with other joint signs must reduce the smallest earlier tip error below this fraction.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: After a fit of the translations, another fit starts from the fitted table if the tip error is at most this
-#: fraction of the reach.
+#: A table with fitted translations is a start table if its tip error is at most this fraction of the reach.
 _CLOSE_START = 1e-6
-#: Large changes (rad) of two consecutive joint offsets. The fit adds the angle to theta_i, and subtracts it
-#: from theta_{i+1}. If alpha_i is nearer to pi than to 0, the fit adds the angle to both.
+#: Large changes (rad), which the fit adds to theta_i and subtracts from theta_{i+1}.
+#: If cos(alpha_i) < 0, the axes point in opposite directions, and the fit adds the change to both.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
-#: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
+#: `count` and `beam_width` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)
 
 
@@ -85,7 +81,6 @@ class TableArrays:
     Attributes:
         cells: (n, 5) numbers; the columns are theta, d, a, alpha and beta.
         turns: 1 for each revolute joint, 0 for each prismatic joint.
-        senses: Signs of the joints.
     """
 
     cells: FloatArray
@@ -106,20 +101,14 @@ class TableArrays:
 
     @cached_property
     def T_0_first_revolute(self) -> FloatArray:
-        """Pose of the first revolute joint's frame in frame 0.
-
-        All joints are at zero.
-        """
+        """Pose of the first revolute joint's frame in frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
     @cached_property
     def T_last_revolute_tip(self) -> FloatArray:
-        """Pose of the tip in the last revolute joint's frame.
-
-        The later joints are at zero.
-        """
+        """Pose of the tip in the last revolute joint's frame, with the later joints at zero."""
         turning = np.flatnonzero(self.turns)
         begin = len(CELLS) * int(turning[-1] if turning.size else len(self.cells) - 1) + CELLS.index("a")
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
@@ -168,10 +157,7 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def error_twists(self, poses: FloatArray) -> FloatArray:
-        """Return the twists from poses to their targets.
-
-        The shape is (6 s,). Angles are multiplied by `scale`.
-        """
+        """Return the twists (6 s,) from poses to their targets, with angles multiplied by `scale`."""
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
@@ -179,9 +165,7 @@ class TargetPoses:
 def tip_poses_and_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses and their derivatives.
-
-    The derivatives are twists. Angles are multiplied by the scale.
+    """Return the tip's poses, and their derivatives as twists with angles multiplied by the scale.
 
     | Result | Shape |
     |---|---|
@@ -204,10 +188,7 @@ def tip_poses_and_derivatives(
 
 
 def _tip_twists_of_frame_motions(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's twists for unit motions of a frame, as an array (6 s, 6) for s samples.
-
-    The columns are translations along the frame's axes, and rotations about these axes.
-    """
+    """Return the tip's Jacobian (6 s, 6) for motions of a frame along and about the frame's axes."""
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)
     twists = np.zeros((len(poses), 6, 6))
@@ -219,10 +200,7 @@ def _tip_twists_of_frame_motions(poses: FloatArray, frames: FloatArray, scale: f
 def apply_changes(
     model: TableArrays, free: FloatArray, scale: float, cells: FloatArray | None = None
 ) -> TableArrays:
-    """Change free parameters and cells slightly.
-
-    For angles, `free` and `cells` contain the change in rad times `scale`.
-    """
+    """Add changes to free parameters and cells; the change of an angle is in rad times `scale`."""
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
     for i, offset in enumerate(free[12:]):
@@ -283,10 +261,9 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of cells that remove the tip error.
+    """Return changes that remove the tip error, with few differences from the cells of `start`.
 
-    The changed table differs from `start` in as few cells as possible. If base, tool and joint offsets can
-    have the same effect on the tip as a cell, the function does not change this cell.
+    A cell stays unchanged if free parameters can have the same effect on the tip.
     """
     Q = _orthonormal_basis(free_derivatives)
     remaining = cell_derivatives - Q @ (Q.T @ cell_derivatives)
@@ -310,11 +287,7 @@ def _orthonormal_basis(columns: FloatArray) -> FloatArray:
 
 
 def find_compensated_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Find the cells with the same effect on the tip as a change of free parameters.
-
-    Returns:
-        Row index and column index of each cell.
-    """
+    """Find the cells (row, column) with the same effect on the tip as free parameters."""
     _, free_derivatives, cell_derivatives = tip_poses_and_derivatives(model, targets)
     Q = _orthonormal_basis(free_derivatives)
     remaining = np.linalg.norm(cell_derivatives - Q @ (Q.T @ cell_derivatives), axis=0)
@@ -335,10 +308,7 @@ def fit_model(
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters and the joint signs.
-
-    The fit tries no further joint signs if metres + reach * radians <= `target_error` (m).
-    """
+    """Fit the free parameters and the joint signs, until the tip error is at most `target_error` (m)."""
     written = TableArrays.of(standard)
 
     def largest_error(model: TableArrays) -> float:
@@ -379,18 +349,15 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 def start_models(
     chain: FrameChain, standard: DHTable, targets: TargetPoses, *effort: int
 ) -> Iterator[TableArrays]:
-    """Yield the table, then one or two tables for each likely combination of joint signs.
-
-    If there are two tables for a combination, the translations are fitted in the second table.
-    """
+    """Yield the table, then one or two tables for each likely combination of joint signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
         model = replace(TableArrays.of(standard), senses=senses, base=alignment.base, tool=alignment.tool)
         model.cells[range(len(senses)), model.variable_indices] += alignment.offsets
         yield model
-        # If an axis is nearly parallel to a prismatic joint's axis, this joint's offset can be wrong by
-        # hundreds of metres. The steps of a fit are too short for such an offset.
+        # Near a nearly parallel axis, a prismatic joint's offset can be wrong by hundreds of metres.
+        # The steps of a fit are too short for this offset.
         moved = _fit_translations(model, targets)
         metres, radians = targets.largest_errors(moved)
         if metres + targets.scale * radians <= _CLOSE_START * targets.scale:
@@ -415,10 +382,7 @@ def _fit_translations(model: TableArrays, targets: TargetPoses) -> TableArrays:
 def fit_free_parameters(
     model: TableArrays, targets: TargetPoses, *, large_angles: bool, only_ends: bool = False
 ) -> TableArrays:
-    """Fit base, tool and joint offsets.
-
-    With `only_ends`, joint offsets stay unchanged.
-    """
+    """Fit base and tool, and without `only_ends` also the joint offsets."""
     for _ in range(2 * len(model.cells)):
         model, size = _least_squares_fit(model, targets, only_ends)
         if not large_angles or size <= _EXACT_FIT_ERROR * targets.scale * math.sqrt(6 * len(targets.values)):
@@ -456,10 +420,7 @@ def _least_squares_fit(
 
 
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Return tables in which the offsets of two consecutive revolute joints change by large angles.
-
-    If the axes of the two joints coincide, the two changes cancel.
-    """
+    """Return tables with large changes of two consecutive offsets, which cancel if the axes coincide."""
     models = []
     for i in range(len(model.cells) - 1):
         sense = math.copysign(1.0, math.cos(float(model.cells[i, CELLS.index("alpha")])))

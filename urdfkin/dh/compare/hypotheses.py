@@ -34,13 +34,10 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Each difference from the interpretation that the file states has this cost (metres):
-#: `cost = _DIFFERENCE_COST_RATIO * min(D) + tolerance`
-#: D is the sum of |shape of the table - shape of the URDF|.
-#: The minimum is over all other interpretations with the URDF's joint kinds.
+#: Cost of a difference from the file's interpretation, as a fraction of the smallest shape difference.
 _DIFFERENCE_COST_RATIO = 0.1
-#: A tip error within the tolerance is accepted, and ends the search for a better interpretation.
-#: A larger tip error is accepted if it is at most this fraction of two lengths.
+#: A tip error within the tolerance ends the search for a better interpretation.
+#: A larger tip error must be at most this fraction of the smaller of two lengths.
 #: The lengths are the reach, and the tip error of the interpretation that the file states.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
@@ -91,8 +88,8 @@ def find_better_interpretation(
 
         error <= max(tolerance, 0.05 min(stated_error, reach))
 
-    `tolerance` and `stated_error` are in metres. `stated_error` is the tip error of the interpretation that
-    the file states. `data` comes from `mapping_from_text`.
+    `tolerance` is in metres. `stated_error` is the position error (m) of the interpretation that the file
+    states, after a fit. `data` comes from `mapping_from_text`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -133,6 +130,9 @@ def find_dh_convention(
     """Find the convention that fits better.
 
     If neither convention fits, other units and columns are tried.
+
+    Raises:
+        InputError: both conventions fit equally well, or no interpretation fits.
     """
     comparisons = dict[DHConvention, TableComparison]()
     errors = list[InputError]()
@@ -217,10 +217,7 @@ class Interpretation:
         return table_from_mapping({**rest, **stated, "rows": rows})
 
     def difference_count(self, other: Interpretation) -> int:
-        """Count the differences between two interpretations.
-
-        Two exchanged columns are one difference.
-        """
+        """Count the differences; two exchanged columns are one difference."""
         columns = sum(
             column != expected for column, expected in zip(self.columns, other.columns, strict=True)
         )

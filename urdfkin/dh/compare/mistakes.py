@@ -110,7 +110,7 @@ class MistakeSearch:
         return model if self._agrees(model) else None
 
     def _fit_one_end(self, table: DHTable) -> TableArrays | None:
-        """Fit only the tool. If the table then does not agree, fit only the base."""
+        """Fit only the tool, or only the base."""
         model = _make_model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
         with_tool = replace(model, tool=_mean_pose(model.tool @ np.linalg.inv(poses) @ target_poses))

@@ -20,15 +20,12 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: If the tip error after a correction of cells is at most this number, it counts as zero.
-#: The unit is rad, or metres per metre of reach.
-#: The rounding errors of a fit are far below this number.
-#: The rounding errors of numbers in data sheets are far above this number.
+#: After a correction of cells, tip errors up to this number count as zero (rad, or m per m of reach).
+#: The rounding errors of a fit are far below this number, and those of data sheets far above.
 NEGLIGIBLE_ERROR = 1e-9
 #: `fit_resolution` increases smaller tip errors to this number (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
-#: Half a unit of a cell's last digit is multiplied by this factor.
-#: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
+#: Factor of half a digit, above 1 because doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_MARGIN = 1.0 + 1e-6
 
 
@@ -188,10 +185,7 @@ class TableComparison:
 
     @property
     def rounding_error(self) -> float:
-        """Largest tip error due to rounding.
-
-        Unit: rad, or m per m of reach and travel.
-        """
+        """Largest tip error due to rounding (rad, or m per m of reach and travel)."""
         return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
     @property
@@ -201,17 +195,15 @@ class TableComparison:
 
     @property
     def resolution(self) -> float:
-        """Rounding step of fitted numbers.
-
-        Unit: rad, or m per m of reach.
-        """
+        """Rounding step of fitted numbers (rad, or m per m of reach)."""
         return fit_resolution(self.metres / self.reach, self.radians)
 
     @property
     def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        The proof holds for all angles, and for displacements within the limits, like `metres_bound`.
+        The proof has the conditions of `metres_bound`: without limits, prismatic joints stay within 10 m of
+        zero.
         """
         return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 
@@ -431,10 +423,7 @@ def _difference_table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Round an offset to a multiple of `fine`, and format the offset.
-
-    An angle within `fine` of a multiple of 15 degrees becomes this multiple.
-    """
+    """Format an offset, rounded to a multiple of `fine`, or to a multiple of 15 degrees within `fine`."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

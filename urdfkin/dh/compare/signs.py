@@ -34,13 +34,11 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: A joint with sign -1 adds this number (metres) to the cost of an alignment.
-#: If several alignments fit equally well, the alignment with the URDF's joint signs is therefore preferred.
+#: Cost (m) of a joint with sign -1, so that of equally good alignments, the URDF's joint signs are chosen.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _NEAR_PRISMATIC_WEIGHT = 1e-3
-#: Axes closer than this distance (m) count as coinciding.
-#: The axis x can then have any direction.
+#: Axes closer than this distance (m) count as coinciding, so x can have any direction.
 _COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
@@ -69,21 +67,17 @@ class SignFit:
 class _PartialAlignment:
     """Signs and offsets with which the first joints of a path match the first rows of a table.
 
-    Attributes:
-        cost: Weighted difference of cells, plus the cost of reversed joints, m.
-        offsets: Joint offsets without the last.
-        phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
-        delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
-        free_offset: A joint offset that can be chosen freely: index of its row, and the sign 1 or -1.
-            If the sign is -1, an increase of this offset rotates the axis x about -z.
+    Rz(phi_in) Tz(delta_in) leads from the last joint's DH frame to its URDF frame.
     """
 
-    cost: float
+    cost: float  # Weighted difference of cells, plus the cost of reversed joints (m).
     senses: tuple[int, ...]
-    offsets: tuple[float, ...]
+    offsets: tuple[float, ...]  # The last joint's offset is missing.
     phi_in: float
     delta_in: float
     base: FloatArray
+    #: Row index of a joint offset that can be chosen freely, and a sign.
+    #: With sign -1, an increase of this offset rotates the axis x about -z.
     free_offset: tuple[int, float] | None = None
 
 
@@ -93,7 +87,7 @@ def find_sign_fits(
     """Return up to `count` alignments with a standard table, best first.
 
     Path and table must have equal joint kinds. With prismatic joints, several combinations of signs may give
-    equal tables. Only a fit distinguishes these combinations.
+    equal tables, which only a fit distinguishes.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -115,10 +109,7 @@ def find_sign_fits(
 
 
 def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
-    """Keep one of several equivalent alignments.
-
-    Equivalent alignments differ by a rotation about coinciding axes.
-    """
+    """Keep one of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
         # If a joint offset can be chosen freely, a change of this offset by pi reverses x.
@@ -130,10 +121,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 
 
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return A_k for two joint signs.
-
-    For the sign -1, the joint frame is rotated by pi about its x axis.
-    """
+    """Return A_k; the sign -1 rotates a joint frame by pi about its x axis."""
     A = chain.constants[k]
     A = _HALF_TURN_ABOUT_X @ A if sense_before < 0 else A
     return np.array(A @ _HALF_TURN_ABOUT_X if sense_after < 0 else A)
@@ -142,7 +130,7 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Add joint i + 1 with the sign `sense` to an alignment; return all possible results."""
+    """Add joint i + 1 with the sign `sense` in all possible ways."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)
@@ -212,9 +200,8 @@ def _possible_transforms(
         # Therefore, x can have any direction if one of the two joints is prismatic.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # If the tilt is above `NEARLY_PARALLEL`, `find_axis_transform` makes a Hayati row only if the common
-        # normal is farther from an origin than the reach. The reach 0 therefore gives a Hayati row, unless
-        # the common normal passes through both origins.
+        # Above `NEARLY_PARALLEL`, a Hayati row needs a common normal that is farther away than the reach.
+        # The reach 0 therefore gives a Hayati row, unless the common normal passes through both origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

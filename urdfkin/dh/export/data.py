@@ -21,11 +21,7 @@ from urdfkin.errors.escape import csv_cell, escape_sequence
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Return the table as plain data, in metres and radians.
-
-    The key `snap` contains the angles that were rounded to multiples of 15 degrees, and bounds of the effect
-    on the tip.
-    """
+    """Return the table as plain data, in metres and radians."""
     data: dict[str, Any] = {
         "convention": str(table.convention),
         "angles": "radians",

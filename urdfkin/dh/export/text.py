@@ -30,8 +30,7 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: Printed bounds are multiplied by this factor, and rounded up.
-#: Without the factor, a tiny rounding error of a bound could increase the last digit by 1.
+#: With this factor, a tiny rounding error of a bound does not increase the last digit when rounding up.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
@@ -55,17 +54,14 @@ def format_variable(
 
 
 def format_coordinate_names(table: DHTable) -> str:
-    """Return text such as "with q1 = left".
-
-    The text is empty if q1 is the joint of row 1, q2 is the joint of row 2, and so on.
-    """
+    """Return text such as "with q1 = left", or "" if qi is the joint of row i."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
-    """Return two numbers: the mimic rule adds the first to theta and the second to d."""
+    """Return the numbers that the mimic rule adds to theta and d."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
     return (offset, 0.0) if row.kind.turns else (0.0, offset)
 
@@ -184,10 +180,7 @@ def write_html(table: DHTable, units: Units) -> str:
 
 
 def write_latex(table: DHTable, units: Units) -> str:
-    """Return a LaTeX table environment.
-
-    Required packages: amsmath, booktabs and graphicx.
-    """
+    """Return a LaTeX table environment that needs amsmath, booktabs and graphicx."""
     at = "_{i-1}" if table.convention is DHConvention.MODIFIED else "_i"
     angle = "rad" if units.angles is AngleUnit.RADIANS else r"$^\circ$"
     symbols = {"a": f"$a{at}$", "alpha": rf"$\alpha{at}$", "d": "$d_i$", "theta": r"$\theta_i$"}
@@ -276,10 +269,7 @@ class PrintedPrecision:
 
 
 def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
-    """Return a printed table's tip error.
-
-    `pose_digits` applies to base and tool.
-    """
+    """Return a printed table's tip error; `pose_digits` applies to base and tool."""
     rows = tuple(_round_row(row, units) for row in table.rows)
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
@@ -311,10 +301,7 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
-    """Return the largest absolute value of the mimicked joint in the mimic rule of `row`.
-
-    If the row has no mimic rule, or the multiplier is 0, the result is 0.
-    """
+    """Return the largest absolute value of the row's mimicked joint, or 0 without a mimic rule."""
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
     for other in table.rows:
