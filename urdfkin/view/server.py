@@ -172,8 +172,8 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: Viser's server keeps only the handler of this message from a page: a control has changed.
-#: The page's connection also keeps its own handlers, for example for the camera and for pictures.
+#: The only message from a page that viser's server handles: a control has changed.
+#: The connection of each page also handles other messages, for example about the camera.
 _ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
@@ -325,11 +325,10 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 
 
 def _remove_message_handlers(server: Any) -> None:
-    """Remove the handlers of viser's server, for example for sharing, uploads and commands.
+    """Remove the handlers of viser's server, except for `_ACCEPTED_MESSAGES`.
 
-    The function does not remove the handlers of the messages in `_ACCEPTED_MESSAGES`. The connection of each
-    page keeps its own handlers. They affect only the camera, the pictures and the controls of this page.
-    urdfkin creates no control for a single page.
+    Removed handlers are, for example, for sharing, uploads and commands. Each page's connection keeps its own
+    handlers, which affect only this page. urdfkin creates no control for a single page.
     """
     try:
         websocket_server = server._websock_server
