@@ -199,8 +199,7 @@ _BOUND_RATIO_FLOOR = 0.1
 class ReportChange:
     """A difference between two reports.
 
-    The field `robot` is None if the difference concerns the whole run. The fields `old` and `new` contain the
-    values in the old and in the new report. If a report has no value, its field `old` or `new` is "".
+    `robot` is None for a difference of the whole run. `old` or `new` is "" if the report has no value.
     """
 
     robot: str | None
@@ -216,7 +215,7 @@ class ReportChange:
 
 @dataclass(frozen=True, slots=True)
 class ReportComparison:
-    """Comparison of an old and a new validation report: the list of all changes.
+    """Comparison of an old and a new validation report.
 
     `sha256` contains the SHA-256 of each robot's text in the new report.
     """
@@ -333,13 +332,9 @@ def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
 def find_renamed_files(
     before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
 ) -> dict[str, str]:
-    """Find robots whose file was renamed between two reports, and return a mapping from old to new source.
+    """Return the new source of each robot with a renamed file, by the old source.
 
-    Source A of the old report was renamed to source B of the new report in this case:
-
-    - A and B have the same robot name.
-    - A is the only source with this name that the new report lacks.
-    - B is the only source with this name that the old report lacks.
+    A file counts as renamed if exactly one removed source and exactly one added source have its robot name.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

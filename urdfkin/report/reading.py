@@ -111,10 +111,7 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
-    """Check each joint's index in q and v, and check nq and nv of the robot.
-
-    Yield a text for each error. A mimic joint must have the same indices in q and v as the mimicked joint.
-    """
+    """Yield an error for each wrong index in q or v, and for wrong sizes of q and v."""
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
         if joint["mimic"] is None:
@@ -273,7 +270,7 @@ def _check(
 
 
 def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
-    """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
+    """Yield an error if `bound_ratio` contradicts the disagreements and bounds.
 
     `bound_ratio` is at least `worst` / largest bound, and at most `worst` / smallest bound.
     """

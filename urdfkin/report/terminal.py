@@ -46,8 +46,8 @@ _WIDE = 100
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
     """Print a report.
 
-    For each failed check, the report contains a command that computes the worst result again. If `cases` is
-    True, the report contains such a command for every check.
+    With `cases`, each check has a command that reproduces the worst result. Without `cases`, only failed
+    checks have this command.
     """
     robots = document["robots"]
     out.print(
@@ -83,10 +83,9 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Return the names of robots without checks, grouped by verdict and reason.
+    """Return the robots without checks in groups of at least five, by verdict and reason.
 
-    For example, all robots that an interrupted validation did not reach have the same reason. Only groups of
-    five or more robots are returned.
+    For example, all robots that an interrupted validation did not reach have the same reason.
     """
     names: dict[tuple[str, str | None], list[str]] = {}
     for robot in robots:

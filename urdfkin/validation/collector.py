@@ -70,7 +70,6 @@ class ResultCollector:
             self._progress(self.make_progress(self._robot_inputs[0].label if self._robot_inputs else ""))
 
     def add(self, task: Task, answer: Answer, *, from_earlier_run: bool = False) -> None:
-        """Add an answer, and report the progress."""
         robot = self._robots[task.robot]
         was_complete, had_problem, before = robot.is_complete, robot.has_problem, robot.chunks_done
         robot.add(task.chunk.index, answer)

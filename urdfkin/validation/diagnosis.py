@@ -35,7 +35,7 @@ EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
 #: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: A difference is divided by its scale. A scale is raised to at least _MIN_SCALE * (largest scale).
+#: Smallest scale, relative to the largest scale. Each difference is divided by its scale.
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
@@ -123,8 +123,7 @@ def diagnose(mistakes: Mistakes, case: DiagnosisCase) -> list[str]:
     return []
 
 
-#: A sentence that describes a common mistake, and a function.
-#: The function returns urdfkin's results with this mistake.
+#: Description of a mistake, and a function that returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -266,11 +265,9 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, scaled)
 
     def _find_scalar_joints(self) -> list[tuple[str, int, int, bool]]:
-        """Return the independent joints with one coordinate.
+        """Return (name, index in q, index in v, is_angle) of each independent joint with one coordinate.
 
-        Returns:
-            A tuple (name, index in q, index in v, is_angle) for each joint. The indices are those of the
-            function's convention.
+        The indices are those of the function's convention.
         """
         tree = self.robot.tree
         joints = []
@@ -289,9 +286,9 @@ class Mistakes:
     def _scale_joints(
         inputs: Inputs, indices: Sequence[tuple[int, int]], factor: float, count: int
     ) -> Inputs:
-        """Multiply the entries of some joints by `factor` in the first `count` of the inputs q, v and a.
+        """Multiply the entries of some joints by `factor` in the first `count` inputs.
 
-        For each joint, `indices` contains its index in q, and its index in v and a.
+        `indices` contains the index in q, and the index in v and a, of each joint.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):

@@ -92,7 +92,6 @@ def _remaining_range(reduction: RangeReduction | None) -> dict[str, Any] | None:
     return {"lower": lower, "upper": upper, "by": reduction.mimic_joints}
 
 
-#: Maximum number of chains in a summary.
 MAX_CHAINS = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")

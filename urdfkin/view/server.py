@@ -69,8 +69,7 @@ _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?
 
 #: Headers of every response.
 #: The headers forbid caching, guessing the content type, and embedding the page.
-#: The page's address contains the key.
-#: Therefore, browsers must not send the address as Referer.
+#: Browsers must not send the page's address as Referer, because the address contains the key.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -232,10 +231,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
 
 def _require_usable_address(host: str) -> None:
-    """Raise InputError if the server cannot listen on the address `host`.
-
-    Without this error, viser would search for a free port forever.
-    """
+    """Raise InputError for an unusable address, because viser would search for a free port forever."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):
@@ -303,7 +299,7 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """Return a context in which each new server checks requests with `process_request` and logs nothing."""
+    """Let each new server check requests with `process_request`, and log nothing."""
     from websockets.asyncio import server as module
 
     original: Any = module.serve
