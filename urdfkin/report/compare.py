@@ -215,10 +215,7 @@ class ReportChange:
 
 @dataclass(frozen=True, slots=True)
 class ReportComparison:
-    """Comparison of an old and a new validation report.
-
-    `sha256` contains the SHA-256 of each robot's text in the new report.
-    """
+    """Changes between two reports. `sha256` contains the digest of each robot's text in the new report."""
 
     changes: tuple[ReportChange, ...]
     sha256: tuple[str | None, ...] = ()
@@ -315,10 +312,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
 
 
 def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
-    """Return the robots of a report by source.
-
-    If several robots have the same source, a number makes the keys different: `ur5`, `ur5 (2)`.
-    """
+    """Return the robots of a report by source. Equal sources get numbers: `ur5`, `ur5 (2)`."""
     named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1

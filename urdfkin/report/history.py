@@ -125,10 +125,7 @@ ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 @dataclass(slots=True)
 class History:
-    """Runs and robots of several reports.
-
-    The keys of `robots` are sources. If a file was renamed, the key is its new source.
-    """
+    """Runs and robots of several reports. The keys of `robots` are the latest sources."""
 
     runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)

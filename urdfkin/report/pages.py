@@ -204,8 +204,8 @@ def _heat_cell(checks: Sequence[ReportedCheck], subject_indices: dict[str, list[
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
     """Return an upper limit of "disagreement / bound" for one frame, joint or column.
 
-    The document has bounds only for the whole check. Therefore, the subject's disagreement is divided by the
-    smallest bound. The check's `bound_ratio` is also an upper limit.
+    The document has bounds only for the whole check. Therefore, the disagreement is divided by the smallest
+    bound.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 has the ratio 0, even if the bound is 0.
@@ -219,7 +219,7 @@ def _bound_ratio(check: ReportedCheck, subject: int) -> float:
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
     """Return rows with the cells joint, a, alpha, beta, d and theta.
 
-    The cell beta is missing if beta is 0 in both tables. The cell of the joint variable also contains q.
+    The cell beta is missing if beta is 0 in both tables.
     """
     rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
     return [_dh_cells(row, has_beta(chain)) for row in rows]

@@ -165,7 +165,7 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between matching frames of model A and the unchanged model B.
+    """Describe the largest distance between matching frames of A and the unchanged B.
 
     The text is empty if rounding errors explain the distance, or if `sameness.after` is empty.
     """
@@ -206,10 +206,7 @@ def describe_renames(sameness: Sameness) -> list[str]:
 
 
 def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the verdict on two models, with the differences and changes that explain the verdict.
-
-    Without `all_`, the document has at most `MAX_LINES` lines of each kind.
-    """
+    """Return the verdict on two models, with the differences and changes that explain the verdict."""
     parts: list[str | Table] = [
         f"{k}: {name}" for k, name in zip("AB", _names_with_sources(sameness), strict=True)
     ]

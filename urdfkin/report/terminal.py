@@ -44,11 +44,7 @@ _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report.
-
-    With `cases`, each check has a command that reproduces the worst result. Without `cases`, only failed
-    checks have this command.
-    """
+    """Print a report, with a command that reproduces each failure; with `cases`, each worst result."""
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio_version(document)}, in eps*scale"
@@ -83,10 +79,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Return the robots without checks in groups of at least five, by verdict and reason.
-
-    For example, all robots that an interrupted validation did not reach have the same reason.
-    """
+    """Return robots without checks by verdict and reason, for reasons that at least five robots share."""
     names: dict[tuple[str, str | None], list[str]] = {}
     for robot in robots:
         if robot["reason"] and not robot["checks"]:

@@ -47,11 +47,7 @@ Progress = Callable[[CampaignProgress], None]
 
 
 class ResultCollector:
-    """Collect the answers of a run for each robot.
-
-    Args:
-        chunk_ranges: Range of chunks to run, for each robot.
-    """
+    """Collect the answers of a run. `chunk_ranges` contains the chunks to run of each robot."""
 
     def __init__(
         self,
@@ -149,7 +145,6 @@ class _RobotAnswers:
 
     @property
     def chunks_done(self) -> int:
-        """Number of chunks that are finished or no longer needed."""
         return len(self.chunks) if self.failures else sum(len(run) for run, _ in self._sums)
 
     @property

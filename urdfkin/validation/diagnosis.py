@@ -49,13 +49,11 @@ Inputs = tuple[FloatArray, ...]
 
 @dataclass(frozen=True)
 class DiagnosisCase:
-    """The results of the function and of urdfkin for some configurations.
+    """Results of the user's function (`actual`) and of urdfkin (`expected`).
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
-        actual: Results of the user's function.
-        expected: urdfkin's results.
-        scale: Scale of each number in `expected`. The bound on a rounding error is k * eps * scale.
+        scale: The bound on the rounding error of each number is k * eps * scale.
         compute: Function that returns urdfkin's results for inputs, a frame and a reference frame.
     """
 
@@ -68,14 +66,10 @@ class DiagnosisCase:
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
         """Return the part of the difference that a mistake does not explain.
 
-        Each difference is divided by its scale. Return inf if `predicted` is not finite, or if `actual`
-        equals `expected`. Otherwise, return:
-
         `max |actual - predicted| / max |actual - expected|`
 
-        Args:
-            predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.
-            n: Use only the first n configurations.
+        Each difference is divided by its scale. `predicted` contains urdfkin's results with the mistake, for
+        the first n configurations. Return inf if `predicted` is not finite, or if `actual` equals `expected`.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):

@@ -100,10 +100,7 @@ def _take_answer(future: Future[Answer]) -> Answer:
 
 
 class RobotTasks:
-    """Iterator over the tasks of a robot.
-
-    `index` is the index of the latest task's chunk. Before the first task, `robot` and `index` are -1.
-    """
+    """Iterator over a robot's tasks. `index` is the latest task's chunk, or -1 before the first task."""
 
     def __init__(self, tasks: Iterable[Task]) -> None:
         self.robot = self.index = -1

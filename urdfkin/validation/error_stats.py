@@ -227,8 +227,8 @@ def compute_error_stats(
 ) -> ErrorStats:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    `frames` are the names of the frames, joints or columns. `inputs` contains q, v and a of each sample.
-    Every result fails unless the factor k of the bound is finite and positive.
+    `frames` are the names of the frames, joints or columns. Every result fails unless the factor k of the
+    bound is finite and positive.
     """
     n, count = results.shape[:2]
     if not results.size:

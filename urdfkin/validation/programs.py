@@ -40,7 +40,6 @@ from urdfkin.model.tree import FloatArray
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
 #: Maximum length of a program's error text in a message.
 #: The length is in characters for an entry `error`, and in bytes for the program's standard error.

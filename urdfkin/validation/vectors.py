@@ -57,7 +57,6 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Version of the file format of the test vectors.
 #: Programs that read version 1 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"

@@ -120,10 +120,7 @@ def _end_with(parent: int) -> None:
 
 
 class ProcessEngine:
-    """Engine with at most `jobs` local worker processes at a time.
-
-    With `isolate`, each robot has its own process.
-    """
+    """Engine with at most `jobs` local worker processes at a time."""
 
     def __init__(self, jobs: int, *, isolate: bool = False) -> None:
         self._jobs, self._isolate = jobs, isolate

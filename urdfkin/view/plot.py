@@ -94,10 +94,6 @@ def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, 
 
 
 def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the disagreement of urdfkin with Pinocchio. Thin lines show the bound on the disagreement.
-
-    The unit is eps * scale (`urdfkin.verify.bounds`).
-    """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.unverified_reason is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
@@ -161,7 +157,7 @@ def _draw_coordinates(
     """Draw the coordinates in `indices` that change during the trajectory.
 
     If no coordinate changes, draw all. If more than `_MOST_NAMES` coordinates are drawn, coordinates that are
-    always within their limits are grey. Thin lines show the limits of coloured coordinates.
+    always within their limits are grey.
     """
     del x
     values: FloatArray = getattr(trajectory, what)

@@ -96,8 +96,7 @@ class RequestFilter:
         """Return the reason why a request is refused, or None if the request is allowed.
 
         `hosts` and `origins` are the values of all Host and Origin headers. `connects` is True if the request
-        opens a WebSocket. A request for a WebSocket must have an Origin header. A request for the page needs
-        no Origin header.
+        opens a WebSocket. A request for a WebSocket must have an Origin header.
 
         Example:
             >>> requests = RequestFilter("127.0.0.1", "key")
@@ -118,10 +117,8 @@ class RequestFilter:
     def _is_known(self, host: str) -> bool:
         """Return whether the filter accepts the host in a Host header.
 
-        The filter accepts `localhost` and each loopback address. If `is_local` is False, the filter also
-        accepts every other IP address, the name `self.host` and the name of this machine. An attacker can
-        make other host names resolve to this machine, but cannot redirect an IP address. The port in the
-        header may be any port, for example a port that the user forwards to the server.
+        An attacker can make foreign host names resolve to this machine, but cannot redirect an IP address.
+        The header may have any port, because the user may forward a port to the server.
         """
         found = _HOST.fullmatch(host)
         if found is None:

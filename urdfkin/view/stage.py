@@ -127,8 +127,8 @@ _FOV = np.deg2rad(75.0)
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
     """Return the position of the camera and the point at which the camera looks, both (3,) in m.
 
-    All `points` (n, 3) are in the picture, with a margin at the edges. `fov` is the vertical field of view
-    (rad). `aspect` is the width of the picture divided by the height.
+    All `points` (n, 3) are in the picture, with a margin. `fov` is the vertical field of view (rad), and
+    `aspect` is width / height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _CAMERA_DIRECTION / np.linalg.norm(_CAMERA_DIRECTION)
@@ -371,7 +371,6 @@ class Stage:
 
 
 def _rotate_z_to(axis: FloatArray) -> FloatArray:
-    """Return a rotation (3, 3) that turns the z axis into the direction `axis`."""
     side = np.eye(3)[int(np.abs(axis).argmin())]
     x = np.cross(side, axis)
     x = x / np.linalg.norm(x)

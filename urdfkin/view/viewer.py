@@ -56,10 +56,7 @@ _MOST_MISSING = 5
 
 @dataclass(frozen=True, slots=True)
 class SliderRow:
-    """A slider for one number of q, v or a.
-
-    `is_angle` is True if the number is an angle or a derivative of an angle.
-    """
+    """A slider for one number of q, v or a. `is_angle` is also True for derivatives of angles."""
 
     index: int
     name: str
