@@ -328,7 +328,7 @@ def find_renamed_files(
 ) -> dict[str, str]:
     """Return the new source of each robot with a renamed file, by the old source.
 
-    A file counts as renamed if exactly one removed source and exactly one added source have its robot name.
+    A file counts as renamed if its robot name has exactly one removed source and exactly one added source.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

@@ -132,8 +132,8 @@ class _LocalWorker(_WithoutWebServer, Worker):
 def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process, without an open port.
 
-    Dask adds its scratch folder to `sys.path`. Therefore, only the current user can access the folder, and
-    the function restores `sys.path`.
+    Dask adds its scratch folder to `sys.path`, where another user could place modules. Therefore, only the
+    current user can access the folder, and the function restores `sys.path`.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}

@@ -39,7 +39,6 @@ _FIRST_SAMPLES = 4
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
-#: Indices that exchange the linear and the angular rows.
 _SWAPPED_HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
@@ -424,7 +423,6 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _find_column_mistakes(mistakes: Mistakes, case: DiagnosisCase) -> Iterator[tuple[float, str]]:
-    """Yield the remainder 0 and a sentence for each column with a simple mistake."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

@@ -4,8 +4,8 @@ Frames are compared in blocks, to limit the memory. The largest arrays are the J
 samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
 results do not depend on the other frames.
 
-Local processes share half of the memory that is free at the start in equal parts. A process of an executor
-uses at most half of the free memory of its machine. If a robot needs more memory than one process may use,
+Each of n local processes may use 1 / (2 n) of the memory that is free at the start. A process of an executor
+may use half of the free memory of its machine. If a robot needs more memory than one process may use,
 the robot is not verified. Its report states the needed and the allowed memory.
 """
 

@@ -70,7 +70,7 @@ class WorkerProcess:
 
 
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """Start a process in its own group, so that Ctrl-C interrupts only the parent."""
+    """Start a process in its own group. Ctrl-C then interrupts only the parent, which saves results."""
     command = python_command(f"from {WORKER_MODULE} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 

@@ -45,7 +45,7 @@ def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k. The first 21 lines differ in colour or dashes."""
+    """Return the colour and the dashes of line k, which are different for the first 21 lines."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
