@@ -199,8 +199,7 @@ _BOUND_RATIO_FLOOR = 0.1
 class ReportChange:
     """A difference between two reports.
 
-    The field `robot` is None if the difference concerns the whole run. The fields `old` and `new` contain the
-    values in the old and in the new report. If a report has no value, its field `old` or `new` is "".
+    `robot` is None for a difference of the whole run. `old` or `new` is "" if the report has no value.
     """
 
     robot: str | None
@@ -216,10 +215,7 @@ class ReportChange:
 
 @dataclass(frozen=True, slots=True)
 class ReportComparison:
-    """Comparison of an old and a new validation report: the list of all changes.
-
-    `sha256` contains the SHA-256 of each robot's text in the new report.
-    """
+    """Changes between two reports. `sha256` contains the digest of each robot's text in the new report."""
 
     changes: tuple[ReportChange, ...]
     sha256: tuple[str | None, ...] = ()
@@ -316,10 +312,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
 
 
 def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
-    """Return the robots of a report by source.
-
-    If several robots have the same source, a number makes the keys different: `ur5`, `ur5 (2)`.
-    """
+    """Return the robots of a report by source. Equal sources get numbers: `ur5`, `ur5 (2)`."""
     named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
@@ -333,13 +326,9 @@ def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
 def find_renamed_files(
     before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
 ) -> dict[str, str]:
-    """Find robots whose file was renamed between two reports, and return a mapping from old to new source.
+    """Return the new source of each robot with a renamed file, by the old source.
 
-    Source A of the old report was renamed to source B of the new report in this case:
-
-    - A and B have the same robot name.
-    - A is the only source with this name that the new report lacks.
-    - B is the only source with this name that the old report lacks.
+    A file counts as renamed if its robot name has exactly one removed source and exactly one added source.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

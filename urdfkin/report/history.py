@@ -125,10 +125,7 @@ ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 @dataclass(slots=True)
 class History:
-    """Runs and robots of several reports.
-
-    The keys of `robots` are the sources of robots. If a file was renamed, the key is its new source.
-    """
+    """Runs and robots of several reports. The keys of `robots` are the latest sources."""
 
     runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)
@@ -220,11 +217,7 @@ def _reports_in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _reports_in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
-    """Yield reports in the order of start times.
-
-    A file that is not a readable report is added to `history.unusable`. A second report of the same run is
-    added to `history.repeated`.
-    """
+    """Yield reports by start time. Add unusable files and repeated runs to `history`."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -252,10 +245,7 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _read_start_time(path: Path) -> tuple[float, str]:
-    """Read the start time of a run from its report, and return it as a Unix time (s) and as text.
-
-    If the report has no valid start time, the Unix time is infinite.
-    """
+    """Return a report's start time as Unix time (s), and as text. If invalid, the Unix time is infinite."""
     data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MAX_BYTES), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     moment = utc(text)
@@ -384,10 +374,7 @@ def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
 
 
 def list_changes(history: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes between runs. Each change has the index of the later run.
-
-    The changes of the latest run come first. Within a run, regressions come before other changes.
-    """
+    """Return all changes with the index of the later run. The latest run and regressions come first."""
     all_changes = [(k, change) for k, run in enumerate(history.runs) for change in run["changes"]]
     return sorted(all_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 

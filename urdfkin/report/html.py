@@ -55,8 +55,7 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
 
-#: Readers can open and close the details of a robot.
-#: Up to this number of robots, all details are open at first.
+#: Up to this number of robots, the details of all robots are open at first.
 _MAX_OPEN_ROBOTS = 1
 #: Maximum number of unverified robots whose details the page shows at first.
 _MAX_OPEN_FAILURES = 20
@@ -69,7 +68,6 @@ MAX_PAGE_CHARACTERS = 5_000_000
 
 @cache
 def environment() -> Environment:
-    """Return the template environment, which escapes every name and rejects undefined variables."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -109,9 +107,8 @@ def as_html(document: Document) -> str:
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
     """Yield the path and the text of each file.
 
-    Paths are relative to the page. The page is the last file. If all details together are longer than
-    `MAX_PAGE_CHARACTERS` characters, each robot has its own file in a folder. For example, the page
-    `report.html` has the folder `report-robots`.
+    Paths are relative to the page, which is the last file. If all details together are longer than
+    `MAX_PAGE_CHARACTERS`, each robot has its own file in a folder.
     """
     document = _worst_first(document)
     robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"

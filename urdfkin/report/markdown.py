@@ -136,18 +136,15 @@ def table_lines(
 ) -> list[str]:
     """Return the lines of a Markdown table.
 
-    The caller must escape the cells. Columns with an index in `left` are left-aligned; all other columns are
-    right-aligned. If `left` is None, all columns are left-aligned.
+    The caller must escape the cells. Columns in `left` are left-aligned, and others right-aligned. If `left`
+    is None, all columns are left-aligned.
     """
     marks = ["---" if left is None or i in left else "---:" for i in range(len(heads))]
     return [row_line(cells) for cells in (heads, marks, *rows)]
 
 
 def count_within(texts: Sequence[str], room: int) -> int:
-    """Return the largest number k for which the first k texts fit into `room` characters.
-
-    Each text has a line end, which counts as one character.
-    """
+    """Return how many of the first texts, each with a line end, fit into `room` characters."""
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 

@@ -202,11 +202,10 @@ def _heat_cell(checks: Sequence[ReportedCheck], subject_indices: dict[str, list[
 
 
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
-    """Return an upper limit of the ratio "disagreement / bound" for one subject: a frame, joint or column.
+    """Return an upper limit of "disagreement / bound" for one frame, joint or column.
 
-    The document has bounds only for the whole check, not for each subject. The result is the subject's
-    largest disagreement divided by the check's smallest bound, but at most the check's `bound_ratio`. This
-    entry is the largest ratio of all subjects.
+    The document has bounds only for the whole check. Therefore, the disagreement is divided by the smallest
+    bound.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 has the ratio 0, even if the bound is 0.
@@ -220,8 +219,7 @@ def _bound_ratio(check: ReportedCheck, subject: int) -> float:
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
     """Return rows with the cells joint, a, alpha, beta, d and theta.
 
-    The cell beta is missing if beta is 0 in all rows of both tables of the chain. The cell of the joint
-    variable (theta or d) also contains q.
+    The cell beta is missing if beta is 0 in both tables.
     """
     rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
     return [_dh_cells(row, has_beta(chain)) for row in rows]

@@ -71,7 +71,7 @@ def model_contradictions(model: ReportedModel, chains: Sequence[Chain]) -> Itera
                 " the joint"
             )
         yield from _joint(joint, joints)
-    yield from _numbering(model)
+    yield from _check_coordinate_indices(model)
     frames = {*links, *names, *frame_names(model)}
     ends = [model["base"], model["tip"], *(end for chain in chains for end in (chain["base"], chain["tip"]))]
     yield from (f"`model`: there is no frame {end}" for end in ends if end not in frames)
@@ -110,11 +110,7 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
             yield f"{where}: it cannot mimic {mimic['mimicked_joint']}"
 
 
-def _numbering(model: ReportedModel) -> Iterator[str]:
-    """Check each joint's index in q and v, and check nq and nv of the robot.
-
-    Yield a text for each error. A mimic joint must have the same indices in q and v as the mimicked joint.
-    """
+def _check_coordinate_indices(model: ReportedModel) -> Iterator[str]:
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
         if joint["mimic"] is None:
@@ -273,7 +269,7 @@ def _check(
 
 
 def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
-    """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
+    """Yield an error if `bound_ratio` contradicts the disagreements and bounds.
 
     `bound_ratio` is at least `worst` / largest bound, and at most `worst` / smallest bound.
     """

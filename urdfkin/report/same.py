@@ -109,10 +109,7 @@ def _length_and_angle(metres: float, radians: float) -> str:
 
 
 def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Describe the largest distance and the largest angle between matching frames.
-
-    The text omits a distance or an angle that rounding errors can explain.
-    """
+    """Describe the largest distance and angle that rounding errors cannot explain."""
 
     def largest_value(attribute: str) -> float:
         return max((getattr(frame, attribute) for frame in frames), default=0.0)
@@ -134,10 +131,7 @@ def _describe_largest_distance(frames: Sequence[Interval], rounding: tuple[float
 
 
 def _describe_distance(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Describe the distance and the angle between two matching frames.
-
-    The text omits a distance or an angle that rounding errors can explain.
-    """
+    """Describe the distance and the angle that rounding errors cannot explain."""
     parts = (
         [interval_text(length, frame.lower, frame.upper)]
         if frame.upper > ROUNDING_FACTOR * rounding[0]
@@ -157,9 +151,8 @@ def far_frames(sameness: Sameness) -> list[Interval]:
 def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    The table shows the distances after the changes of model B in `sameness.after`. The verdict "same up to
-    single precision" is about the unchanged models. If a report has this verdict, the heading lists the
-    changes.
+    The table shows distances after the changes of model B. The verdict "same up to single precision" is about
+    the unchanged models. Therefore, the heading then lists the changes.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
@@ -172,10 +165,9 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between matching frames of model A and the unchanged model B.
+    """Describe the largest distance between matching frames of A and the unchanged B.
 
-    The text is empty if rounding errors explain the distance. The text is also empty if `sameness.after` is
-    empty, which means that no change brings model B closer to model A.
+    The text is empty if rounding errors explain the distance, or if `sameness.after` is empty.
     """
     frame = sameness.as_written
     off = "" if frame is None else _describe_distance(frame, sameness.rounding)
@@ -185,8 +177,7 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text contains the nonzero coordinates of model A. The text also contains the nonzero coordinates of
-    those joints of model B that match no independent joint of model A.
+    The text contains the nonzero coordinates of model A, and those of unmatched joints of model B.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -215,10 +206,7 @@ def describe_renames(sameness: Sameness) -> list[str]:
 
 
 def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the verdict on two models, with the differences and changes that explain the verdict.
-
-    Without `all_`, the document has at most `MAX_LINES` lines of each kind.
-    """
+    """Return the verdict on two models, with the differences and changes that explain the verdict."""
     parts: list[str | Table] = [
         f"{k}: {name}" for k, name in zip("AB", _names_with_sources(sameness), strict=True)
     ]
@@ -314,11 +302,7 @@ def as_document(sameness: Sameness) -> TextDocument:
 
 
 def distance_text(frame: Interval) -> str:
-    """Return the distance of two matching frames in the worst configuration, as text with a unit.
-
-    If the distance is 0, return the angle between the frames instead. If the angle is 0 too, return an empty
-    text.
-    """
+    """Return the distance of two matching frames as text; the angle if the distance is 0."""
     if frame.lower:
         return length(frame.lower)
     return angle(frame.radians_seen) if frame.radians_seen else ""
@@ -432,11 +416,9 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    If `worst` is None, A is in its zero configuration, and B is in the matching configuration. If `written`
-    is True, model B has the base pose in the file of B. If `written` is False, model B has the base pose
-    `sameness.base`, which brings model B closest to model A. Each line segment is four numbers: x and y of
-    the start point, and x and y of the end point. Each picture has the lines of A and the lines of B. In the
-    enlarged picture, another line connects the origins of the worst frame in A and in B.
+    Without `worst`, A is in its zero configuration, and B is in the matching configuration. With `written`,
+    the base of B has the pose in the file of B. Otherwise, it has the pose `sameness.base`, which brings B
+    closest to A. A line segment is four numbers: x and y of the start, and x and y of the end.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -475,7 +457,7 @@ def _skeleton_lines(robot: Robot, Ts: FloatArray) -> FloatArray:
 
 
 def _axes(T: FloatArray, size: float) -> FloatArray:
-    """Return the start and end points (3, 2, 3) of lines that show the three axes of a frame."""
+    """Return lines (3, 2, 3) from the frame's origin along its axes."""
     origin = np.tile(T[:3, 3], (3, 1))
     return np.stack((origin, origin + size * T[:3, :3].T), axis=1)
 

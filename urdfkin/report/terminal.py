@@ -44,11 +44,7 @@ _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report.
-
-    For each failed check, the report contains a command that computes the worst result again. If `cases` is
-    True, the report contains such a command for every check.
-    """
+    """Print a report, with a command that reproduces each failure; with `cases`, each worst result."""
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio_version(document)}, in eps*scale"
@@ -83,11 +79,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Return the names of robots without checks, grouped by verdict and reason.
-
-    For example, all robots that an interrupted validation did not reach have the same reason. Only groups of
-    five or more robots are returned.
-    """
+    """Return robots without checks by verdict and reason, for reasons that at least five robots share."""
     names: dict[tuple[str, str | None], list[str]] = {}
     for robot in robots:
         if robot["reason"] and not robot["checks"]:

@@ -71,17 +71,14 @@ def format_units(value: Units, *, compared: bool = True) -> str:
 
 
 def format_ratio(ratio: Units) -> str:
-    """Format the ratio of a disagreement to its bound.
-
-    A ratio below 10 is written as a percentage. A ratio of 10 or more is written as a factor, such as "12 x".
-    """
+    """Format the ratio of a disagreement to its bound: as a percentage, or from 10 on like "12 x"."""
     if ratio is None:
         return "inf"
     return f"{ratio:.1%}" if ratio < 10.0 else f"{ratio:.2g} x"
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value. None stands for infinity, so None is larger than every number."""
+    """Return the largest value; None means infinity."""
     largest = 0.0
     for value in values:
         if value is None:
@@ -104,7 +101,7 @@ def checks_in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def quantities_by_heading(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the quantities of each column in the table of robots. The keys are the column headings."""
+    """Return the quantities of each column in the table of robots."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].heading if name in QUANTITIES else name
@@ -177,10 +174,7 @@ def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[
 
 
 def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str]:
-    """Return a row of the table about the second oracle. `second_oracle_heads` returns the headings.
-
-    A ratio in a cell is the largest "disagreement / bound" of all `checks`.
-    """
+    """Return a row under `second_oracle_heads`, with the largest ratios of all `checks`."""
     checks = [check for check in checks if "second_oracle" in check]
     found = [check["second_oracle"] for check in checks]
     outliers = {

@@ -53,9 +53,8 @@ from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compu
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
-#: The representations of the orientation that each row for analytical Jacobians summarizes.
+#: Representations of the orientation, by the reference of an `AccuracyLine`.
 #: Angles about fixed axes are omitted, because they are Euler angles in the reverse order.
-#: The Jacobian has the same rows in the reverse order.
 _ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),

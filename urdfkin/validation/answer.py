@@ -47,7 +47,6 @@ Answer = ChunkResult | Failure
 
 
 def answer_chunk(chunk: Chunk) -> Answer:
-    """Run a chunk; convert an error (class `Exception`) into a `Failure`."""
     try:
         return run_chunk(chunk)
     except Exception as error:

@@ -163,8 +163,7 @@ def validate(
             if _should_load_kernels(len(unfinished_inputs) * samples) and (
                 isolate or any(map(_can_be_loaded, unfinished_inputs))
             ):
-                # If the kernels are loaded before the workers start, no robot's computing time contains a
-                # compilation.
+                # Load the kernels now, so that no robot's computing time contains a compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
@@ -291,14 +290,11 @@ class _Campaign:
 def chunks_of_shard(robots: int, chunking: Chunking, shard: str | None = None) -> list[range]:
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
-    The shards are contiguous ranges in the order of robots and chunks, so that most robots are read by one
-    shard only. The numbers of chunks of two shards differ by at most one.
+    Shards are contiguous, so that most robots are read by one shard only. The numbers of chunks of two shards
+    differ by at most one.
 
     >>> chunks_of_shard(2, Chunking(1000), "1/4"), chunks_of_shard(2, Chunking(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
-
-    Raises:
-        InputError: `shard` does not have the form i/n with 1 <= i <= n.
     """
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", "1/1" if shard is None else shard)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):

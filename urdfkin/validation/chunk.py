@@ -213,7 +213,6 @@ def compare_robot(
     timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, ErrorStats]:
-    """Return the error statistics of each quantity in each reference frame, for all frames and joints."""
     error_stats: dict[Key, ErrorStats] = {}
     arguments = robot, oracle, x, first_sample, timings
     for frames in memory.blocks(len(robot.all_frames), memory.frame_array_bytes(len(x.q), robot.nv)):
@@ -262,9 +261,9 @@ class _FrameComparison(_Comparison):
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Compare urdfkin's result for a link with Pinocchio's results for the link and for its parent joint.
+        """Compare each link's result with Pinocchio's results for the link and for its parent joint.
 
-        The link and the joint have the same frame, but Pinocchio has different functions for them.
+        Both have the same frame, but Pinocchio has different functions for links and joints.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():

@@ -46,7 +46,7 @@ _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 _MAX_TRIES = 20
 #: Seconds after which the number of workers is read again.
 _REFRESH_SECONDS = 1.0
-#: Packages that must have the same version as in this process. A scheduler may lack these packages.
+#: If the scheduler has these packages, their versions must be those of this process.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _EMPTY_ROBOT_INPUT = RobotInput(b"", Origin(""))
 
@@ -132,8 +132,8 @@ class _LocalWorker(_WithoutWebServer, Worker):
 def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process, without an open port.
 
-    Dask adds its scratch folders to `sys.path`, so another user could place modules there. Only the current
-    user can access the temporary folder. The function restores `sys.path`.
+    Dask adds its scratch folder to `sys.path`, where another user could place modules. Therefore, only the
+    current user can access the folder, and the function restores `sys.path`.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -162,7 +162,6 @@ def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError on a difference, before any robot or chunk is sent to the cluster."""
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = f"install urdfkin {package_version('urdfkin')} on the worker's machine"

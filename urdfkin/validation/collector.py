@@ -47,11 +47,7 @@ Progress = Callable[[CampaignProgress], None]
 
 
 class ResultCollector:
-    """Collect the answers of a run for each robot.
-
-    Args:
-        chunk_ranges: Range of chunks to run, for each robot.
-    """
+    """Collect the answers of a run. `chunk_ranges` contains the chunks to run of each robot."""
 
     def __init__(
         self,
@@ -70,7 +66,6 @@ class ResultCollector:
             self._progress(self.make_progress(self._robot_inputs[0].label if self._robot_inputs else ""))
 
     def add(self, task: Task, answer: Answer, *, from_earlier_run: bool = False) -> None:
-        """Add an answer, and report the progress."""
         robot = self._robots[task.robot]
         was_complete, had_problem, before = robot.is_complete, robot.has_problem, robot.chunks_done
         robot.add(task.chunk.index, answer)
@@ -150,7 +145,6 @@ class _RobotAnswers:
 
     @property
     def chunks_done(self) -> int:
-        """Number of chunks that are finished or no longer needed."""
         return len(self.chunks) if self.failures else sum(len(run) for run, _ in self._sums)
 
     @property

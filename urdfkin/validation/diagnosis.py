@@ -35,11 +35,10 @@ EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
 #: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: A difference is divided by its scale. A scale is raised to at least _MIN_SCALE * (largest scale).
+#: Smallest scale, relative to the largest scale. Each difference is divided by its scale.
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
-#: Indices that exchange the linear and the angular rows.
 _SWAPPED_HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
@@ -49,13 +48,11 @@ Inputs = tuple[FloatArray, ...]
 
 @dataclass(frozen=True)
 class DiagnosisCase:
-    """The results of the function and of urdfkin for some configurations.
+    """Results of the user's function (`actual`) and of urdfkin (`expected`).
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
-        actual: Results of the user's function.
-        expected: urdfkin's results.
-        scale: Scale of each number in `expected`. The bound on a rounding error is k * eps * scale.
+        scale: The bound on the rounding error of each number is k * eps * scale.
         compute: Function that returns urdfkin's results for inputs, a frame and a reference frame.
     """
 
@@ -68,14 +65,10 @@ class DiagnosisCase:
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
         """Return the part of the difference that a mistake does not explain.
 
-        Each difference is divided by its scale. Return inf if `predicted` is not finite, or if `actual`
-        equals `expected`. Otherwise, return:
-
         `max |actual - predicted| / max |actual - expected|`
 
-        Args:
-            predicted: urdfkin's results with one possible mistake of the user, such as an inverted placement.
-            n: Use only the first n configurations.
+        Each difference is divided by its scale. `predicted` contains urdfkin's results with the mistake, for
+        the first n configurations. Return inf if `predicted` is not finite, or if `actual` equals `expected`.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -123,8 +116,7 @@ def diagnose(mistakes: Mistakes, case: DiagnosisCase) -> list[str]:
     return []
 
 
-#: A sentence that describes a common mistake, and a function.
-#: The function returns urdfkin's results with this mistake.
+#: Description of a mistake, and a function that returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -266,11 +258,9 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, scaled)
 
     def _find_scalar_joints(self) -> list[tuple[str, int, int, bool]]:
-        """Return the independent joints with one coordinate.
+        """Return (name, index in q, index in v, is_angle) of each independent joint with one coordinate.
 
-        Returns:
-            A tuple (name, index in q, index in v, is_angle) for each joint. The indices are those of the
-            function's convention.
+        The indices are those of the function's convention.
         """
         tree = self.robot.tree
         joints = []
@@ -289,9 +279,9 @@ class Mistakes:
     def _scale_joints(
         inputs: Inputs, indices: Sequence[tuple[int, int]], factor: float, count: int
     ) -> Inputs:
-        """Multiply the entries of some joints by `factor` in the first `count` of the inputs q, v and a.
+        """Multiply the entries of some joints by `factor` in the first `count` inputs.
 
-        For each joint, `indices` contains its index in q, and its index in v and a.
+        `indices` contains the index in q, and the index in v and a, of each joint.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):
@@ -433,7 +423,6 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _find_column_mistakes(mistakes: Mistakes, case: DiagnosisCase) -> Iterator[tuple[float, str]]:
-    """Yield the remainder 0 and a sentence for each column with a simple mistake."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

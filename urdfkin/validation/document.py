@@ -23,7 +23,9 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_NULL_MEANING = "null: infinite, for example because a result is NaN."
+_NULL_MEANING = (
+    "null: infinite, for example because a result is NaN, or because two different values have the bound 0."
+)
 Units = Annotated[
     NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
 ]
@@ -34,12 +36,16 @@ ReferenceName = Literal["local", "world", "local_world_aligned"]
 
 
 class ReportedLimit(TypedDict):
-    """Limits of a joint. A missing limit is null."""
+    """Limits of a joint."""
 
-    lower: Annotated[float | None, doc("Lower position limit, rad or m.")]
-    upper: Annotated[float | None, doc("Upper position limit, rad or m.")]
-    velocity: Annotated[float | None, doc("Limit of the joint velocity, rad/s or m/s.")]
-    effort: Annotated[float | None, doc("Limit of the joint torque or force, N m or N.")]
+    lower: Annotated[
+        float | None, doc("Lower position limit, rad or m; null: no limit, as for a continuous joint.")
+    ]
+    upper: Annotated[
+        float | None, doc("Upper position limit, rad or m; null: no limit, as for a continuous joint.")
+    ]
+    velocity: Annotated[float | None, doc("Limit of the joint velocity, rad/s or m/s; null: no limit.")]
+    effort: Annotated[float | None, doc("Limit of the joint torque or force, N m or N; null: no limit.")]
 
 
 class ReportedMimic(TypedDict):
@@ -422,7 +428,8 @@ class ReportedRobot(TypedDict):
         list[ReportedCheck], doc("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
     accuracy: Annotated[
-        ReportedAccuracy | None, doc("Result of the accuracy study; null if there is no result.")
+        ReportedAccuracy | None,
+        doc("Result of the accuracy study; null without `--accuracy`, or if the study has no result."),
     ]
 
 

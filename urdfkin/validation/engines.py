@@ -62,7 +62,6 @@ class ExecutorEngine:
         self._executor = executor
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
-        """Run the tasks; an error of the executor is reported as a failure."""
         all_tasks, failed_robots = chain.from_iterable(work), set[int]()
         pending = deque[tuple[Task, Future[Answer]]]()
         next_task = next(all_tasks, None)
@@ -101,12 +100,7 @@ def _take_answer(future: Future[Answer]) -> Answer:
 
 
 class RobotTasks:
-    """Iterator over the tasks of a robot.
-
-    Attributes:
-        robot: Index of the robot; -1 before the first task.
-        index: Index of the latest task's chunk; -1 before the first task.
-    """
+    """Iterator over a robot's tasks. `index` is the latest task's chunk, or -1 before the first task."""
 
     def __init__(self, tasks: Iterable[Task]) -> None:
         self.robot = self.index = -1
@@ -137,10 +131,7 @@ class WorkQueue:
         self._removed_robots = set[int]()
 
     def take_for_idle_worker(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker; None if there is none.
-
-        Robots that no worker has started come first.
-        """
+        """Return the next task, or None. Robots that no worker has started come first."""
         for tasks in self._waiting:
             self._started_robots.append(tasks)
             if (task := self.next(tasks)) is not None:
@@ -153,10 +144,7 @@ class WorkQueue:
         return None
 
     def next(self, tasks: RobotTasks) -> Task | None:
-        """Return the next task of a robot.
-
-        Return None after the last task, or if the robot was removed.
-        """
+        """Return the next task; None after the last task, or if the robot was removed."""
         task = next(tasks, None)
         if task is None or task.robot in self._removed_robots:
             if tasks in self._started_robots:

@@ -91,8 +91,7 @@ def make_cross_check(
 ) -> CrossCheck:
     """Compare urdfkin, Pinocchio and the second oracle in pairs.
 
-    The results have the shape (n, frames, ...). The two bounds are for the differences between urdfkin and
-    Pinocchio, and between urdfkin and the second oracle.
+    The results have the shape (n, frames, ...). Both bounds are for differences from urdfkin's results.
     """
     if not results.size:
         return CrossCheck(by, OraclePair(), OraclePair())
@@ -160,10 +159,9 @@ class ErrorStats:
         results: Number of compared matrices or six-vectors.
         worst: The largest disagreement, in eps * scale.
         bound_ratio: The largest ratio of a disagreement to its bound.
-        histogram: (82,) numbers of results, one for each bin. `HISTOGRAM_EDGES` separates the bins. The first
-            bin is below the first edge, and the last bin is above the last edge.
-        worst_by_frame: The largest disagreement of each frame, in eps * scale. The frames have the same order
-            as in the robot.
+        histogram: (82,) numbers of results in bins, which `HISTOGRAM_EDGES` separates. The first bin is below
+            the first edge, and the last bin is above the last edge.
+        worst_by_frame: The largest disagreement of each frame, in eps * scale, in the robot's order.
         bounds: Smallest and largest bound on a result's disagreement, in eps * scale.
     """
 
@@ -229,9 +227,8 @@ def compute_error_stats(
 ) -> ErrorStats:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    `frames` are the names of the frames, joints or columns. `first_sample` is the index of the first sample
-    within the robot. `inputs` contains q, v and a of each sample. Every result fails unless the factor k of
-    the bound is finite and positive.
+    `frames` are the names of the frames, joints or columns. Every result fails unless the factor k of the
+    bound is finite and positive.
     """
     n, count = results.shape[:2]
     if not results.size:

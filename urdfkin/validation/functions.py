@@ -42,9 +42,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.call import Call
 
 _BATCH_SIZE = 256
-#: Number of configurations in a diagnosis.
 _DIAGNOSIS_SAMPLES = 48
-#: Maximum number of stored error messages.
 _MAX_MESSAGES = 5
 #: Largest relative difference that single precision can cause.
 _MAX_SINGLE_PRECISION_ERROR = 1e-5
@@ -341,18 +339,16 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """Results for a batch of configurations.
-
-    The user's function returned a valid result for n of these configurations.
+    """Results for a batch. The function returned a valid result for n configurations of the batch.
 
     Attributes:
         first: Index of the batch's first configuration in the whole check.
-        inputs: Inputs of all configurations of the batch, in the function's convention.
+        inputs: Inputs of the whole batch, in the function's convention.
         valid_indices: (n,) indices in the batch.
-        actual: (n, ...) results of the function.
-        expected: (n, ...) results of urdfkin.
-        scale: (n, ...) scale of each number. The allowed difference is k * eps * scale.
-        k: (n,) `FunctionCheck.factor` included.
+        actual: (n, ...), from the user's function.
+        expected: (n, ...), from urdfkin.
+        scale: (n, ...). The allowed difference is k * eps * scale.
+        k: (n,), `FunctionCheck.factor` included.
     """
 
     first: int
@@ -443,7 +439,7 @@ class _Run:
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
-        """Inputs and results are in the function's convention; the results are not verified."""
+        """Compute unverified results in the function's convention."""
         native_inputs = self._to_native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
@@ -519,10 +515,10 @@ class _Run:
         return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Convert the scale of a bound from urdfkin's convention to the convention of the user's function.
+        """Convert the scale of a bound to the function's convention.
 
-        After its rows are reordered, a Jacobian is multiplied from the right by `conversion.inverse_matrix`.
-        The scale is multiplied by the absolute values of this matrix.
+        A Jacobian is multiplied from the right by `conversion.inverse_matrix`. Therefore, the scale is
+        multiplied by the absolute values of this matrix.
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
@@ -588,7 +584,7 @@ class _Run:
         if total.not_finite:
             yield f"{total.not_finite} {'result is' if total.not_finite == 1 else 'results are'} not finite"
             return
-        if total.bound_ratio <= 1.0:  # All differences are within their bounds.
+        if total.bound_ratio <= 1.0:
             return
         if total.eps_scale * EPS <= _MAX_SINGLE_PRECISION_ERROR and math.isfinite(total.bound_ratio):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
@@ -693,10 +689,7 @@ def _try_call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """After an exception or an invalid result, add a message to `total` and return None.
-
-    The result is copied, because the function may reuse its arrays.
-    """
+    """Return a copy of the result, because the function may reuse its arrays; None after an error."""
     try:
         result = function(*inputs)
         if result is None:

@@ -4,8 +4,8 @@ Frames are compared in blocks, to limit the memory. The largest arrays are the J
 samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
 results do not depend on the other frames.
 
-Local processes share half of the memory that is free at the start in equal parts. A process of an executor
-uses at most half of the free memory of its machine. If a robot needs more memory than one process may use,
+Each of n local processes may use 1 / (2 n) of the memory that is free at the start. A process of an executor
+may use half of the free memory of its machine. If a robot needs more memory than one process may use,
 the robot is not verified. Its report states the needed and the allowed memory.
 """
 
@@ -19,7 +19,6 @@ from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
 #: Maximum size (bytes) of an array of results; one frame's array can be larger.
-#: At most _MAX_ARRAYS such arrays exist at the same time.
 MAX_BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FREE_FRACTION = 0.5
@@ -43,17 +42,13 @@ def frame_array_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, item_bytes: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `MAX_BLOCK_BYTES`.
-
-    A larger item gets its own slice. For zero items, yield one empty slice.
-    """
+    """Yield slices of at most `MAX_BLOCK_BYTES`, or of one item. For zero items, yield one empty slice."""
     items = max(1, MAX_BLOCK_BYTES // item_bytes)
     for start in range(0, max(1, count), items):
         yield slice(start, min(count, start + items))
 
 
 def estimate_bytes(tree: KinematicTree, samples: int) -> int:
-    """Estimate the memory for a comparison, bytes."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(MAX_BLOCK_BYTES, 2 * links * frame_array_bytes(samples, nv))
     return (
@@ -96,7 +91,7 @@ def _find_free_bytes() -> Iterator[int]:
 
 
 def _find_group_free_bytes(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """Yield the free memory of a control group and its parents, bytes.
+    """Yield the free memory of a control group and of its parents.
 
     In a container, the highest visible control group is the container's own group.
     """

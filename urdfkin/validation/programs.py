@@ -40,10 +40,10 @@ from urdfkin.model.tree import FloatArray
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum length of an error text of the program in a message.
-_MAX_ERROR_BYTES = 300
+#: Maximum length of a program's error text in a message.
+#: The length is in characters for an entry `error`, and in bytes for the program's standard error.
+_MAX_ERROR_LENGTH = 300
 #: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
 #: One day, s.
@@ -66,10 +66,10 @@ class Program:
         frame: Name of the frame.
         reference: Name of the reference frame; None if the quantity has no reference frame.
         convention: Name of the convention of q, v, a and the result; None for urdfkin's convention.
-        timeout: Longest time for an answer, in seconds; at most a day.
+        timeout: Longest time for an answer, in seconds: above 0, and at most 86,400 (one day).
 
     Raises:
-        InputError: the command is empty, or the timeout is not between 0 and one day.
+        InputError: the command is empty, or `timeout` is outside its range.
         SourceError: the program cannot be started.
 
     >>> import urdfkin
@@ -140,8 +140,9 @@ class Program:
         """Return the program's result for one configuration.
 
         Raises:
-            ProgramError: the program ended, took too long, or gave no result. After three consecutive
-                failures, the program is not called again.
+            ProgramError: the program ended, took too long, gave an invalid answer, or answered with an
+                error. After three consecutive failures, the program is not called again. An answer with
+                an error is not a failure.
             SourceError: the program cannot be started again.
         """
         if self._failures >= _MAX_FAILURES:
@@ -158,7 +159,7 @@ class Program:
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):
-            raise ProgramError(message[:_MAX_ERROR_BYTES])
+            raise ProgramError(message[:_MAX_ERROR_LENGTH])
         return answer["result"]
 
     def _start(self) -> None:
@@ -225,15 +226,14 @@ class Program:
             self._process.wait(1.0)
         status = self._process.poll()
         self._error_output.seek(0, os.SEEK_END)
-        self._error_output.seek(max(0, self._error_output.tell() - _MAX_ERROR_BYTES))
-        message = " ".join(self._error_output.read(_MAX_ERROR_BYTES).decode(errors="replace").split())
+        self._error_output.seek(max(0, self._error_output.tell() - _MAX_ERROR_LENGTH))
+        message = " ".join(self._error_output.read(_MAX_ERROR_LENGTH).decode(errors="replace").split())
         self._stop()
         how = "closed its output" if status is None else f"ended with exit code {status}"
         return f"the program {how}" + (f": {message}" if message else "")
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Return the answer. Raise ProgramError if it has neither a `result` nor a text as `error`."""
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):

@@ -21,12 +21,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run`: the outcome of a chunk, and data.
-#: "answer": The data are the pickled answer of the chunk.
-#: "died": The chunk crashed two processes.
-#: The data are a text with the signal or exit status of the second crash.
-#: "other code": The worker's versions or digests differ from the client's.
-#: The data are the worker's versions or digests.
+#: Outcome of a chunk, and data.
+#: "answer": The data are the pickled answer.
+#: "died": The data are the signal or exit status of the second crash.
+#: "other code": The data are the worker's versions and digests, which differ from the client's.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

@@ -40,10 +40,7 @@ LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Return library versions, and digests of code and equations.
-
-    The digest of the code does not include the packages in `_DISPLAY_PACKAGES`.
-    """
+    """Return library versions, and digests of the equations and of the code without `_DISPLAY_PACKAGES`."""
     equations = hashlib.sha256(read_bytes(_PACKAGE_FOLDER / "kinematics" / "equations.py")).hexdigest()
     return {name: package_version(name) for name in LIBRARIES} | {
         "code": _digest_code(),
@@ -228,7 +225,7 @@ class ValidationReport(Displayable):
 
     @property
     def outcome(self) -> RunOutcome:
-        """The outcome of the run. If the run has not passed, the outcome contains the reason."""
+        """The outcome of the run, with a reason if the run has not passed."""
         return outcome((robot.verdict for robot in self.robots), self.robots_requested, self.interrupted)
 
     @property

@@ -96,11 +96,7 @@ class RobotInput:
         return robot
 
     def load(self) -> Robot:
-        """Load the robot.
-
-        Raises:
-            OracleError: Pinocchio refuses or misreads the file.
-        """
+        """Load the robot; raise OracleError if Pinocchio refuses or misreads the file."""
         robot = self.make_robot()
         if robot.verifier.known_refusal is not None:
             raise OracleError(robot.verifier.known_refusal, where=self.label)

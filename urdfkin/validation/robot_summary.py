@@ -5,8 +5,7 @@ findings in the file, Denavit-Hartenberg tables, and a comparison with yourdfpy.
 which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
-from the base to the leaves. Only one of several paths with the same moving joints is a chain. Each chain has
-a standard and a modified table.
+from the base to the leaves. Only one of several paths with the same moving joints is a chain.
 """
 
 from __future__ import annotations
@@ -92,7 +91,6 @@ def _remaining_range(reduction: RangeReduction | None) -> dict[str, Any] | None:
     return {"lower": lower, "upper": upper, "by": reduction.mimic_joints}
 
 
-#: Maximum number of chains in a summary.
 MAX_CHAINS = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")

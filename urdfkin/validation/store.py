@@ -58,14 +58,11 @@ from urdfkin.verify.oracles import package_version, package_versions
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import AccuracyStudy
 
-#: Name and version of the layout of a store.
 _LAYOUT = "urdfkin-campaign/1"
 _MAX_DIFFERENCES = 4
 _MANIFEST, _LOCK, _CHUNKS, _DAMAGED = "manifest.json", "lock", "chunks", "damaged"
 _SCRATCH_FOLDER = ".writing"
-#: File with the settings of the accuracy study.
 _STUDY_SETTINGS_FILE = "accuracy.json"
-#: Suffix of files with accuracy results.
 _STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
@@ -202,7 +199,6 @@ class Store:
             return None
 
     def write_answer(self, robot: int, index: int, answer: Answer) -> None:
-        """Write an answer; the file's content is flushed to the disk before the file gets its name."""
         key = self.manifest.key(robot, index)
         self.write_entry(key, _FAILED if isinstance(answer, Failure) else _DONE, encode_answer(key, answer))
 
@@ -233,11 +229,7 @@ class Store:
                 self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
     def count_chunks(self) -> dict[int, tuple[int, bool]]:
-        """Count the chunks with a stored result, for each robot.
-
-        Returns:
-            For each robot: the number of chunks with a result, and whether a chunk failed.
-        """
+        """Return the number of chunks with a result, and whether a chunk failed, for each robot."""
         names = {path.name for kind in (_DONE, _FAILED) for path in self._find_files(kind)}
         counts = {}
         for robot in range(len(self.manifest.robots)):
@@ -276,9 +268,9 @@ class Store:
             )
 
     def writing_process(self) -> str | None:
-        """Return a process that writes to the store; None if there is no such process.
+        """Return a process that writes to the store, or None.
 
-        The processes of a sharded validation share the store's lock, and each process locks its own file.
+        The processes of shards share the store's lock, and each process locks a file of its own.
         """
         for path in (self.folder / _LOCK, *sorted(self.folder.glob(f"{_LOCK}-*"))):
             try:
@@ -379,10 +371,7 @@ def open_store(
 
 
 def _is_store_entry(path: Path) -> bool:
-    """Return whether a store without a manifest can contain `path`.
-
-    A new store gets its lock before its manifest.
-    """
+    """Return whether a store can contain `path` before it has a manifest."""
     return path.name in (_SCRATCH_FOLDER, _CHUNKS) or path.name.startswith(_LOCK)
 
 
@@ -489,10 +478,7 @@ class FailedStudy:
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study.
-
-    With `moving_base`, the root link has a random motion in each sample. Otherwise, the root link is fixed.
-    """
+    """Settings of the accuracy study. `moving_base`: the root link has a random motion in each sample."""
 
     samples: int
     seed: int

@@ -57,15 +57,14 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Version of the file format of the test vectors.
 #: Programs that read version 1 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot. The first configuration is the zero configuration.
 #: If the limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
-#: Random joint velocities and joint accelerations are between -_MAX_RANDOM and _MAX_RANDOM.
-#: Random q of planar and floating joints, except quaternions, are also between -_MAX_RANDOM and _MAX_RANDOM.
+#: Largest absolute value of random v and a.
+#: The same limit holds for random q of planar and floating joints, except quaternions.
 _MAX_RANDOM = 2.0
 #: Inputs are rounded to multiples of 1 / _STEPS_PER_UNIT, except quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
@@ -278,7 +277,10 @@ def make_configuration(
 
 
 def _format_tolerance(k: float, scale: float) -> str:
-    """Return the tolerance as a rounded decimal, or "0" if the scale is 0."""
+    """Return k * eps * scale, rounded as `_TOLERANCE_DIGITS` describes.
+
+    eps * scale is at least the smallest positive double, unless the scale is 0.
+    """
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_TOLERANCE_DIGITS):
@@ -406,10 +408,7 @@ def _write_vectors(
 
 
 def _format_result(result: Mapping[str, Any]) -> str:
-    """Return a result as JSON.
-
-    `value` and `tolerance` contain decimals as texts. The function writes the digits without rounding.
-    """
+    """Return a result as JSON. The decimal texts in `value` and `tolerance` become numbers, unrounded."""
     texts = {name: json_text(x) for name, x in result.items()}
     texts |= {name: f"[{', '.join(result[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
@@ -433,7 +432,7 @@ def _compute_results(
 ) -> Iterator[dict[str, Any]]:
     """Compute results with intervals of `digits` digits.
 
-    An entry of `value` is None if its interval is too wide for 17 digits.
+    An entry of `value` is None if its interval is too wide for `format_decimal`.
     """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:

@@ -36,7 +36,6 @@ from urdfkin.validation.answer import (
 from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, WorkQueue
 
-#: Module with the function `serve`, which each worker process runs.
 WORKER_MODULE = "urdfkin.validation.worker_processes"
 #: Maximum time to wait for the exit status of a crashed worker, s.
 _EXIT_TIMEOUT = 5.0
@@ -51,8 +50,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # The parent closes its copy of the worker's end, so that the pipe closes as soon as the worker
-            # ends.
+            # Close this copy of the worker's end, so that the pipe closes when the worker ends.
             theirs.close()
 
     @property
@@ -72,7 +70,7 @@ class WorkerProcess:
 
 
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """The process has its own group, so Ctrl-C interrupts only the parent, which saves finished results."""
+    """Start a process in its own group. Ctrl-C then interrupts only the parent, which saves results."""
     command = python_command(f"from {WORKER_MODULE} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 
@@ -96,12 +94,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def serve(pipe: int, parent: int) -> None:
-    """Run the chunks that the parent process sends.
-
-    Args:
-        pipe: File descriptor of the connection.
-        parent: Process id of the parent.
-    """
+    """Run the chunks that the process `parent` sends over the file descriptor `pipe`."""
     _end_with(parent)
     connection, chunks = Connection(pipe), SimpleQueue[Chunk]()
     threading.Thread(target=_receive_chunks, args=(connection, chunks), daemon=True).start()
@@ -110,7 +103,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Receive chunks. When the parent ends, the pipe closes, and this process ends too."""
+    """Receive chunks. End this process when the pipe closes, because the parent has ended."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -127,22 +120,12 @@ def _end_with(parent: int) -> None:
 
 
 class ProcessEngine:
-    """Engine with local worker processes.
-
-    Args:
-        jobs: Maximum number of processes at a time.
-        isolate: Whether each robot has its own process.
-    """
+    """Engine with at most `jobs` local worker processes at a time."""
 
     def __init__(self, jobs: int, *, isolate: bool = False) -> None:
         self._jobs, self._isolate = jobs, isolate
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
-        """Run the tasks of all robots.
-
-        If a robot crashes a process, its unfinished tasks run last, in a separate process. With `isolate`,
-        these tasks do not run.
-        """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, crash_reason=CRASHED).run()
             return
@@ -155,9 +138,8 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    Args:
-        crash_reason: Reason in the report of a robot that crashed its process. If the argument is None, a
-            process can validate several robots. Otherwise, each process validates one robot.
+    With `crash_reason`, each process validates one robot, and a crash is reported with this reason. Without
+    `crash_reason`, a process can validate several robots.
     """
 
     def __init__(
@@ -166,12 +148,10 @@ class _WorkerPool:
         self._jobs, self._on_answer, self._crash_reason = jobs, on_answer, crash_reason
         self._queue = WorkQueue(work, share_robots=crash_reason is None)
         self._workers: list[_PoolWorker] = []
-        #: The unfinished tasks of each robot that crashed a process.
-        #: These tasks run after the tasks of all other robots.
+        #: Unfinished tasks of each robot that crashed a process.
         self.to_retry: dict[int, list[Task]] = {}
 
     def run(self) -> None:
-        """Run until no task is left. The worker processes end even after an error."""
         try:
             while True:
                 self._assign_tasks()

@@ -63,9 +63,8 @@ def _projection() -> FloatArray:
 
 @dataclass
 class _Canvas:
-    """A two-dimensional drawing of points and directions, which are given in the axes of the base.
+    """A two-dimensional drawing of points and directions in the base frame.
 
-    The first row of `projection` (2, 3) points to the right in the drawing, and the second row points up.
     `size` (m) is the largest extent of the chain along an axis of the base.
     """
 
@@ -91,11 +90,7 @@ class _Canvas:
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def draw_labels(self) -> None:
-        """Draw the labels.
-
-        A label that is too close to an earlier label moves sideways. Labels of one colour at about the same
-        point are joined: "x_1, x_2".
-        """
+        """Join labels of one colour at about the same point, and move other close labels sideways."""
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for point, along, text, color in self.labels:
             for other, _, texts, other_color in merged:

@@ -153,10 +153,7 @@ def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
 
 
 def as_gif(frames: list[np.ndarray], seconds_per_frame: float) -> bytes:
-    """Return an endless animation of frames (height, width, 3 or 4).
-
-    Each frame lasts `seconds_per_frame`, rounded to 0.01 s, but at least 0.02 s.
-    """
+    """Return an endless animation of frames (height, width, 3 or 4)."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
     # Browsers show GIF frames of 1/100 s for too long.

@@ -45,7 +45,7 @@ def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k. The first 21 lines differ in colour or dashes."""
+    """Return the colour and the dashes of line k, which are different for the first 21 lines."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
@@ -94,10 +94,6 @@ def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, 
 
 
 def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the disagreement of urdfkin with Pinocchio. Thin lines show the bound on the disagreement.
-
-    The unit is eps * scale (`urdfkin.verify.bounds`).
-    """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.unverified_reason is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
@@ -160,9 +156,8 @@ def _draw_coordinates(
 ) -> None:
     """Draw the coordinates in `indices` that change during the trajectory.
 
-    If no coordinate changes, the panel shows all coordinates in `indices`. If more than
-    `_MOST_NAMES` coordinates are drawn, coordinates that are always within their limits are grey. Thin
-    horizontal lines show the finite limits of each coloured coordinate.
+    If no coordinate changes, draw all. If more than `_MOST_NAMES` coordinates are drawn, coordinates that are
+    always within their limits are grey.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
@@ -192,10 +187,9 @@ def _draw_coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return an array that is True for each value outside the coordinate's limits.
+    """Return whether each value is outside the coordinate's limits.
 
-    A double that is next to a limit still counts as inside, because the limit's decimal notation may be
-    rounded.
+    The double next to a limit counts as inside, because the limit's decimal notation may be rounded.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -223,10 +217,7 @@ _DERIVATIVES_UNCHECKED = (
 
 
 def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """Return a figure with the panels that `panels` names. By default, the figure contains all panels.
-
-    The names of panels are the keys of `PANELS` and the names in `COORDINATE_PANELS`.
-    """
+    """Return a figure with the named panels of `PANELS` and `COORDINATE_PANELS`; by default, with all."""
     drawn = _select_panels(robot, trajectory, list(panels) or [*COORDINATE_PANELS, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)

@@ -92,8 +92,8 @@ class Shape:
         kind: "box", "cylinder", "sphere" or "mesh".
         size: Size in m: (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere. A mesh has
             the scale factors (x, y, z) instead.
-        colour: Red, green, blue and opacity, each from 0 to 1. If the attribute is None, a mesh has the
-            colours of its file. STL files and other shapes are then `GREY`.
+        colour: Red, green, blue and opacity, each from 0 to 1. None: the colours of the mesh's file, or
+            `GREY` for STL files and other shapes.
     """
 
     link: str
@@ -187,7 +187,7 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
 
 
 def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
-    """Return the path of the mesh file that an address in a URDF names, or None if there is no such file.
+    """Return the path of the mesh file at an address in a URDF; None if there is no such file.
 
     A relative path in the URDF is relative to the folder of the URDF.
     """

@@ -69,8 +69,7 @@ _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?
 
 #: Headers of every response.
 #: The headers forbid caching, guessing the content type, and embedding the page.
-#: The page's address contains the key.
-#: Therefore, browsers must not send the address as Referer.
+#: Browsers must not send the page's address as Referer, because the address contains the key.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -97,8 +96,7 @@ class RequestFilter:
         """Return the reason why a request is refused, or None if the request is allowed.
 
         `hosts` and `origins` are the values of all Host and Origin headers. `connects` is True if the request
-        opens a WebSocket. A request for a WebSocket must have an Origin header. A request for the page needs
-        no Origin header.
+        opens a WebSocket. A request for a WebSocket must have an Origin header.
 
         Example:
             >>> requests = RequestFilter("127.0.0.1", "key")
@@ -119,10 +117,8 @@ class RequestFilter:
     def _is_known(self, host: str) -> bool:
         """Return whether the filter accepts the host in a Host header.
 
-        The filter accepts `localhost` and each loopback address. If `is_local` is False, the filter also
-        accepts every other IP address, the name `self.host` and the name of this machine. An attacker can
-        make other host names resolve to this machine, but cannot redirect an IP address. The port in the
-        header may be any port, for example a port that the user forwards to the server.
+        An attacker can make foreign host names resolve to this machine, but cannot redirect an IP address.
+        The header may have any port, because the user may forward a port to the server.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -172,8 +168,8 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: Viser's server keeps only the handler of this message from a page: a control has changed.
-#: The page's connection also keeps its own handlers, for example for the camera and for pictures.
+#: The only message from a page that viser's server handles: a control has changed.
+#: The connection of each page also handles other messages, for example about the camera.
 _ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
@@ -232,10 +228,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
 
 def _require_usable_address(host: str) -> None:
-    """Raise InputError if the server cannot listen on the address `host`.
-
-    Without this error, viser would search for a free port forever.
-    """
+    """Raise InputError for an unusable address, because viser would search for a free port forever."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):
@@ -303,7 +296,7 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """Return a context in which each new server checks requests with `process_request` and logs nothing."""
+    """Let each new server check requests with `process_request`, and log nothing."""
     from websockets.asyncio import server as module
 
     original: Any = module.serve
@@ -325,11 +318,10 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 
 
 def _remove_message_handlers(server: Any) -> None:
-    """Remove the handlers of viser's server, for example for sharing, uploads and commands.
+    """Remove the handlers of viser's server, except for `_ACCEPTED_MESSAGES`.
 
-    The function does not remove the handlers of the messages in `_ACCEPTED_MESSAGES`. The connection of each
-    page keeps its own handlers. They affect only the camera, the pictures and the controls of this page.
-    urdfkin creates no control for a single page.
+    Removed handlers are, for example, for sharing, uploads and commands. Each page's connection keeps its own
+    handlers, which affect only this page. urdfkin creates no control for a single page.
     """
     try:
         websocket_server = server._websock_server

@@ -57,11 +57,9 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """Return an arrow for each column of the Jacobian `x.jacobian`.
+    """Return an arrow for the linear or angular part of each column of the Jacobian.
 
-    `x` is the motion of a frame in one sample, in the reference frame LOCAL_WORLD_ALIGNED. An arrow shows the
-    linear part of a column, or the angular part if `angular` is True. A part with a norm of at most 1e-9 has
-    no arrow.
+    `x` has one sample, in LOCAL_WORLD_ALIGNED. A part with a norm of at most 1e-9 has no arrow.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -72,10 +70,9 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
-    """Return an arrow for each kind of acceleration in `ACCELERATION_KINDS`, and one for their sum.
+    """Return an arrow for each of `ACCELERATION_KINDS`, and one for their sum.
 
-    `x` is the motion of a frame in one sample, in the reference frame LOCAL_WORLD_ALIGNED. An acceleration
-    of at most 1e-9 m/s^2 has no arrow.
+    `x` has one sample, in LOCAL_WORLD_ALIGNED. An acceleration of at most 1e-9 m/s^2 has no arrow.
     """
     parts = np.vstack([x.breakdown.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
@@ -100,9 +97,8 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length 1, scaled for the scene.
 
-    `x` is the motion of a frame in one sample, in the reference frame LOCAL_WORLD_ALIGNED. `reach` is the
-    robot's size (m). The largest half-length of the ellipsoid is 0.3 `reach` unless the Jacobian is 0. All
-    half-lengths are at least 0.002 `reach`.
+    `x` has one sample, in LOCAL_WORLD_ALIGNED. `reach` is the robot's size (m). The largest half-length is
+    0.3 `reach`, unless the Jacobian is 0.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -115,10 +111,7 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
 
 
 def quaternions_scalar_first(R: FloatArray) -> FloatArray:
-    """Convert rotation matrices (..., 3, 3) to quaternions (..., 4) in the order w, x, y, z.
-
-    Viser uses this order.
-    """
+    """Convert rotation matrices (..., 3, 3) to quaternions (..., 4) in viser's order w, x, y, z."""
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
@@ -134,8 +127,8 @@ _FOV = np.deg2rad(75.0)
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
     """Return the position of the camera and the point at which the camera looks, both (3,) in m.
 
-    All `points` (n, 3) are in the picture, with a margin at the edges. `fov` is the vertical field of view
-    (rad). `aspect` is the width of the picture divided by the height.
+    All `points` (n, 3) are in the picture, with a margin. `fov` is the vertical field of view (rad), and
+    `aspect` is width / height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _CAMERA_DIRECTION / np.linalg.norm(_CAMERA_DIRECTION)
@@ -159,8 +152,8 @@ _NORMAL_COLOUR, _OFFSET_COLOUR = (230, 159, 0), (86, 180, 233)
 class Stage:
     """A robot in viser's scene.
 
-    `reach` (m) is the diagonal of a box around the link origins in the neutral configuration. If the diagonal
-    is 0, `reach` is 1 m. `missing` lists the meshes that cannot be shown.
+    `reach` (m) is the diagonal of a box around the link origins in the neutral configuration. `missing` lists
+    the meshes that cannot be shown.
     """
 
     def __init__(self, server: Any, robot: Robot) -> None:
@@ -208,10 +201,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._points_in_view, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the visual shapes, and return whether the scene needs the skeleton.
-
-        The scene needs the skeleton if the robot has no shapes, or if a shape cannot be shown.
-        """
+        """Add the visual shapes, and return whether the skeleton must replace missing shapes."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -286,10 +276,7 @@ class Stage:
             self._set_camera(client)
 
     def _set_first_camera(self, client: Any) -> None:
-        """Set the camera of a new page.
-
-        Shortly after a page opens, the panel makes the view narrower. The camera is then set again.
-        """
+        """Set the camera of a new page, and again when the panel makes the view narrower."""
         begin, last_aspect = time.monotonic(), 0.0
 
         def update_camera(_: Any) -> None:
@@ -384,7 +371,6 @@ class Stage:
 
 
 def _rotate_z_to(axis: FloatArray) -> FloatArray:
-    """Return a rotation (3, 3) that turns the z axis into the direction `axis`."""
     side = np.eye(3)[int(np.abs(axis).argmin())]
     x = np.cross(side, axis)
     x = x / np.linalg.norm(x)

@@ -56,10 +56,7 @@ _MOST_MISSING = 5
 
 @dataclass(frozen=True, slots=True)
 class SliderRow:
-    """A slider for one number of q, v or a.
-
-    `is_angle` is True if the number is an angle or a derivative of an angle.
-    """
+    """A slider for one number of q, v or a. `is_angle` is also True for derivatives of angles."""
 
     index: int
     name: str
@@ -71,9 +68,8 @@ class SliderRow:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    The text `unit_suffix` follows the unit: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
-    `on_change` is called with the index and the new number. `on_change` is not called when the program sets
-    a slider.
+    The text `unit_suffix` follows the unit: "" for q, "/s" for v, "/s²" for a. `on_change` receives the index
+    and the new number when the user moves a slider, but not when the program sets a slider.
     """
 
     def __init__(
@@ -165,10 +161,9 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[SliderRow]:
-    """Return a slider's data for each coordinate that can change.
+    """Return a slider's data for each coordinate that can change, except quaternions.
 
-    The range of a slider is the range between the coordinate's limits. Without limits, the range is from -pi
-    to pi rad, or from -1 to 1 m. The numbers of a quaternion have no sliders.
+    Without limits, the range is from -pi to pi rad, or from -1 to 1 m.
     """
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):

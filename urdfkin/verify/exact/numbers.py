@@ -90,9 +90,9 @@ def _round_outward(end: arb, towards: float) -> float:
 def format_decimal(x: Number, negligible: float) -> str | None:
     """Return an interval's midpoint as a decimal of 17 digits, or None if the interval is too wide.
 
-    The radius of the interval must be at most 1e-20 |midpoint|. The decimal then differs from the true value
-    by at most 0.501 units of the last digit. An interval that contains 0 returns "0" if its radius is at most
-    1e-10 `negligible`.
+    An interval that contains 0 is too wide if its radius is above 1e-10 `negligible`. Otherwise, its decimal
+    is "0". Any other interval is too wide if its radius is above 1e-20 |midpoint|. Otherwise, its decimal
+    differs from the true value by at most 0.501 units of the last digit.
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
