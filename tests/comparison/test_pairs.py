@@ -262,7 +262,7 @@ def test_a_common_base_and_a_common_tip_fix_the_zeros_of_prismatic_joints(common
 
 def test_the_zeros_of_many_joints_are_not_computed_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(matcher, "MAX_REFINED_JOINTS", 2)
-    a = random_chain("RPR", 0)
+    a = random_chain("RPPPRR", 0)
     b = loaded(pairs.disguised(a.tree, 0))
     assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
 
@@ -271,6 +271,27 @@ def test_a_chain_with_a_displaced_axis_differs_without_common_names() -> None:
     a = random_chain("RPRRRP", 0)
     b = loaded(pairs.disguised(pairs.lengthened(a.tree, 1e-6), 0))
     assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
+
+
+def branched_robot(seed: int) -> Robot:
+    """Return a robot with a revolute joint, a prismatic joint and two revolute joints side by side."""
+    rng = np.random.default_rng(seed)
+    joints = []
+    for i, (kind, parent) in enumerate([("revolute", 0), ("prismatic", 1), ("revolute", 2), ("revolute", 2)]):
+        origin = 'xyz="{} {} {}"'.format(*rng.choice([0.0, 0.1, 0.2, -0.3], 3))
+        axis = rng.choice(["1 0 0", "0 1 0", "0 0 1"])
+        joints.append(joint(f"j{i}", kind, f"l{parent}", f"l{i + 1}", origin, axis, limit(-1, 1)))
+    return built(*joints, verify=False)
+
+
+# In these robots, only the axes after the prismatic joint determine the shift along the first axis.
+@pytest.mark.parametrize("seed", [3, 4, 12, 13, 17, 26])
+def test_branches_after_a_prismatic_joint_need_no_common_names(seed: int) -> None:
+    a = branched_robot(seed)
+    b = loaded(pairs.disguised(a.tree, seed))
+    found = urdfkin.same(a, b, bounds=False)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert moves_alike(found, a, b)
 
 
 # -- the order of joints -----------------------------------------------------------------------------

@@ -321,14 +321,16 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes of A and B after the joints `via`.
 
-    A branch ends at the first axis that is not nearly parallel to `reference_line[0]`, because nearly
-    parallel axes determine zero offsets inexactly.
+    A branch ends at the first revolute axis that is not nearly parallel to `reference_line[0]`. Later axes are
+    needed because a prismatic axis has no position, and a nearly parallel axis determines zero offsets
+    inexactly.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction)) < _NEARLY_PARALLEL_SINE:
+        sine = np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction))
+        if not axes[0].turns or sine < _NEARLY_PARALLEL_SINE:
             next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
             yield from later_axes(
                 mechanisms, (e, f), next_bodies, screws if axes[0].turns else reference_line
@@ -419,14 +421,16 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If no joint follows `axis_a`, the first axes of all branches determine the pose of B's root.
+        # If the axes after `axis_a` do not determine the pose of B's root, the first axes of all branches do.
         # For example, each rotor of a drone is the only joint of its branch.
-        others = after or [_with_reference_lines(lines, *pair) for pair, *_ in firsts]
+        branches = [_with_reference_lines(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
-            for angle in _candidates(axis_a.screw, [*before, *others], K, turns=True):
+            # A rotation about A's axis does not change coordinates along this axis.
+            shifts = _candidates(axis_a.screw, K, after, branches, turns=False)
+            for angle in _candidates(axis_a.screw, K, [*before, *after], branches, turns=True):
                 X = screw_motion(axis_a.screw, angle, turns=True) @ K
-                for shift in _candidates(axis_a.screw, others, X, turns=False):
+                for shift in shifts:
                     yield screw_motion(axis_a.screw, shift, turns=False) @ X
 
 
@@ -475,7 +479,7 @@ def root_poses_by_siblings(
             for angle in zero_candidates(u, pair[0], pair[1].transform(K), turns=True):
                 X = screw_motion(u, angle, turns=True) @ K
                 shifts = list(zero_candidates(u, pair[0], pair[1].transform(X), turns=False))
-                for shift in shifts or _candidates(u, [*other_pairs, *later_pairs], X, turns=False):
+                for shift in shifts or _candidates(u, X, [*other_pairs, *later_pairs], turns=False):
                     yield screw_motion(u, shift, turns=False) @ X
 
 
@@ -487,10 +491,13 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
     return [edge for edge in mechanism.edges_by_body[body] if mechanism.joint(edge).kind.has_axis]
 
 
-def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
-    return [
-        x for axis_a, axis_b in pairs for x in zero_candidates(u, axis_a, axis_b.transform(X), turns)
-    ] or [0.0]
+def _candidates(u: Screw, X: FloatArray, *groups: Sequence[Both[Axis]], turns: bool) -> list[float]:
+    """Return the values of the first group of axis pairs that determines any, or [0]."""
+    for pairs in groups:
+        found = [x for one, other in pairs for x in zero_candidates(u, one, other.transform(X), turns)]
+        if found:
+            return found
+    return [0.0]
 
 
 def _first_revolute_axes(
