@@ -143,7 +143,7 @@ def test_every_command_has_a_row_on_the_page_of_commands() -> None:
 
 def test_the_readme_shows_a_command_for_each_of_four_users() -> None:
     shown = [words[0] for words, _ in transcripts()]
-    assert shown == ["dh", "acceleration", "check", "export", "export"]
+    assert shown == ["dh", "acceleration", "check", "same", "export", "export"]
 
 
 @pytest.mark.slow

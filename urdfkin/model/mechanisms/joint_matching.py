@@ -321,9 +321,8 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes of A and B after the joints `via`.
 
-    A branch ends at the first revolute axis that is not nearly parallel to `reference_line[0]`. Later axes are
-    needed because a prismatic axis has no position, and a nearly parallel axis determines zero offsets
-    inexactly.
+    A branch ends at the first revolute axis that is not nearly parallel to `reference_line[0]`. A prismatic
+    axis has no position, and a nearly parallel axis determines zero offsets inexactly.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
