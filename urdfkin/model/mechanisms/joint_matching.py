@@ -317,22 +317,32 @@ _NEARLY_PARALLEL_SINE = 1e-2
 
 
 def later_axes(
-    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference_line: Both[Screw]
+    mechanisms: Both[Mechanism],
+    via: Both[Edge | None],
+    bodies: Both[int],
+    reference_line: Both[Screw],
+    *,
+    past_prismatic: bool = False,
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes of A and B after the joints `via`.
 
-    A branch ends at the first revolute axis that is not nearly parallel to `reference_line[0]`. A prismatic
-    axis has no position, and a nearly parallel axis determines zero offsets inexactly.
+    A branch ends at the first axis that is not nearly parallel to `reference_line[0]`, because nearly
+    parallel axes determine zero offsets inexactly. With `past_prismatic`, a branch ends at the first such
+    revolute axis, because a prismatic axis has no position.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
         sine = np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction))
-        if not axes[0].turns or sine < _NEARLY_PARALLEL_SINE:
+        if sine < _NEARLY_PARALLEL_SINE or (past_prismatic and not axes[0].turns):
             next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
             yield from later_axes(
-                mechanisms, (e, f), next_bodies, screws if axes[0].turns else reference_line
+                mechanisms,
+                (e, f),
+                next_bodies,
+                screws if axes[0].turns else reference_line,
+                past_prismatic=past_prismatic,
             )
 
 
@@ -418,16 +428,16 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     The rotation about A's axis and the shift along A's axis are 0 unless other axes determine them.
     """
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
-    for (axis_a, axis_b), before, after in firsts:
+    for (axis_a, axis_b), before, after, further in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If the axes after `axis_a` do not determine the pose of B's root, the first axes of all branches do.
-        # For example, each rotor of a drone is the only joint of its branch.
-        branches = [_with_reference_lines(lines, *pair) for pair, *_ in firsts]
+        # If the axes after `axis_a` do not determine the pose of B's root, other axes are used: axes after a
+        # prismatic joint, and axes of other branches, such as the rotors of a drone.
+        more = [*further, *(_with_reference_lines(lines, *pair) for pair, *_ in firsts)]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
             # A rotation about A's axis does not change coordinates along this axis.
-            shifts = _candidates(axis_a.screw, K, after, branches, turns=False)
-            for angle in _candidates(axis_a.screw, K, [*before, *after], branches, turns=True):
+            shifts = _candidates(axis_a.screw, K, after, more, turns=False)
+            for angle in _candidates(axis_a.screw, K, [*before, *after], more, turns=True):
                 X = screw_motion(axis_a.screw, angle, turns=True) @ K
                 for shift in shifts:
                     yield screw_motion(axis_a.screw, shift, turns=False) @ X
@@ -490,13 +500,15 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
     return [edge for edge in mechanism.edges_by_body[body] if mechanism.joint(edge).kind.has_axis]
 
 
-def _candidates(u: Screw, X: FloatArray, *groups: Sequence[Both[Axis]], turns: bool) -> list[float]:
-    """Return the values of the first group of axis pairs that determines any, or [0]."""
-    for pairs in groups:
-        found = [x for one, other in pairs for x in zero_candidates(u, one, other.transform(X), turns)]
-        if found:
-            return found
-    return [0.0]
+def _candidates(
+    u: Screw, X: FloatArray, pairs: Sequence[Both[Axis]], more: Sequence[Both[Axis]] = (), *, turns: bool
+) -> list[float]:
+    """Return the values that `pairs` determine; otherwise 0 and the values that `more` determines."""
+    found, others = (
+        [x for one, other in group for x in zero_candidates(u, one, other.transform(X), turns)]
+        for group in (pairs, more)
+    )
+    return found or [0.0, *others]
 
 
 def _first_revolute_axes(
@@ -504,13 +516,13 @@ def _first_revolute_axes(
     via: Both[Edge | None],
     bodies: Both[int],
     earlier_pairs: tuple[Both[Axis], ...],
-) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
+) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]], list[Both[Axis]]]]:
     """Pair the first revolute axis of each branch of A with the first revolute axis of each branch of B.
 
-    Each item contains the pair, the earlier pairs of prismatic axes, and the result of `later_axes`. Branches
-    without revolute axes give their last pair of prismatic axes.
+    Each item contains the pair, the earlier pairs of prismatic axes, and the results of `later_axes` without
+    and with `past_prismatic`. Branches without revolute axes give their last pair of prismatic axes.
     """
-    first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
+    first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
         pair, next_bodies = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
@@ -522,9 +534,8 @@ def _first_revolute_axes(
             if pair[0].turns
             else _first_revolute_axes(mechanisms, (e, f), next_bodies, (*earlier_pairs, pair))
         )
-        first_axes += deeper or [
-            (pair, earlier_pairs, list(later_axes(mechanisms, (e, f), next_bodies, lines)))
-        ]
+        after = partial(later_axes, mechanisms, (e, f), next_bodies, lines)
+        first_axes += deeper or [(pair, earlier_pairs, list(after()), list(after(past_prismatic=True)))]
     return first_axes
 
 
