@@ -7,8 +7,8 @@ library once. Ratios are therefore reliable even on a machine with other load, b
 script prints medians, minima and ratios of medians. A library that is not installed is listed, but not
 measured.
 
-`--only where` measures the time of each step of a batch and of a single call. `--only first` measures the
-first call of each quantity, in a new process.
+The section `where` measures the time of each step of a batch, and of each step of a single call. The section
+`first` measures the first call of each quantity, in a new process.
 """
 
 import argparse

@@ -34,7 +34,7 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: load_features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Largest error of an element of a correct pose: a coordinate (m) or an entry of the rotation matrix.
+#: Tolerance for each element of a pose: a coordinate (m) or an entry of the rotation matrix.
 #: Rounding errors are below 1e-14.
 #: If a library misreads an element, the error is above 1e-3.
 TOLERANCE = 1e-9

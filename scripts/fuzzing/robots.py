@@ -237,7 +237,7 @@ class _RandomRobot:
 
     def limit(self, kind: str) -> str:
         rng = self.rng
-        # With `versions`, planar, floating and fixed joints may have limits (URDF 1.2).
+        # In URDF 1.2, planar, floating and fixed joints may have limits.
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):

@@ -81,7 +81,7 @@ class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a
     "--to",
     type=_Language(tuple(LANGUAGES)),
     help="Language of the code.",
-    show_default="the language of the suffix of --output (.py: numpy); c without a suffix",
+    show_default="from the suffix of --output, such as numpy for .py; otherwise c",
 )
 @click.option(
     "--form",

@@ -107,7 +107,7 @@ class Interval:
 
 
 #: Value of a parameter of a joint or link.
-#: A str is a type or a name, and a float is a limit of velocity or effort.
+#: A type or a name is a str. A limit of velocity or effort is a float.
 #: For "limits", a tuple contains the lower and the upper limit.
 #: For "idle", a tuple contains the type of a joint that never moves, and the joint's value (rad or m).
 #: For "only in A" and "only in B", a tuple contains the names of links.

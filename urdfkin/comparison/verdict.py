@@ -345,7 +345,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Return bounds (m, rad) on the frame displacements by rounding.
+        """Bound the displacement (m) and the rotation (rad) of frames that rounding can cause.
 
         `same` ignores a small difference at each joint:
 

@@ -338,7 +338,7 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference (eps) between urdfkin and Pinocchio for a term with one factor.
+    """Return the allowed difference (eps) between urdfkin and Pinocchio for each factor of a term.
 
     `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 

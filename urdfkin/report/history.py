@@ -444,7 +444,7 @@ def _stacks(history: History) -> list[dict[str, Counter[str]]]:
 
 
 def _height(ratio: Units) -> float:
-    """Return the height of a bar (%) on a logarithmic axis from a thousandth of the bound to the bound.
+    """Return the height of a bar (%) on a logarithmic axis. The axis shows ratios from 0.001 to 1.
 
     >>> [_height(x) for x in (0.0, 0.001, 1.0, 7.0, None)]
     [2.0, 2.0, 100.0, 100.0, 100.0]

@@ -1699,7 +1699,7 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # If `frame` is a plain str and `reference` is the default, `frame` is the key.
-        # The key then contains no `Reference`, because the hash of an enumeration member is slow.
+        # This key is fast. The hash of a `Reference` is slow, because `Reference` is an enumeration.
         # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
         # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str

@@ -218,8 +218,8 @@ class Chain(TypedDict):
     worst: Annotated[
         Units,
         doc(
-            "Largest disagreement of the tip's placement, Jacobian and acceleration of both tables, in eps"
-            " * scale. null: infinite, or nothing was compared."
+            "Largest disagreement of a table's tip with Pinocchio in placement, Jacobian and acceleration, in"
+            " eps * scale. null: infinite, or nothing was compared."
         ),
     ]
     bound_ratio: Annotated[

@@ -5,7 +5,7 @@ findings in the file, Denavit-Hartenberg tables, and a comparison with yourdfpy.
 which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
-from the base to the leaves. Only one of several paths with the same moving joints is a chain.
+from the base to the leaves. If several paths have the same moving joints, only one of them is a chain.
 """
 
 from __future__ import annotations

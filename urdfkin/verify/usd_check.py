@@ -40,11 +40,10 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Tolerance for the angle (rad) between two frames of a joint, in roundings to single precision.
-#: `_check_joint` derives this bound.
+#: Tolerance for the angle (rad) between two frames of a joint.
+#: The unit is the error of a rounding to single precision. `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
-#: Tolerance for the origin of a joint's frame, in roundings to single precision.
-#: `_check_joint` derives this bound.
+#: Tolerance for the origin of a joint's frame, in the same unit. `_check_joint` derives this bound.
 _ORIGIN_ROUNDINGS = 3.0
 #: A prim's transform consists of operations, such as rotations.
 #: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.

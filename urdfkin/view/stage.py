@@ -201,7 +201,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._points_in_view, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the visual shapes, and return whether the skeleton must replace missing shapes."""
+        """Add the visual shapes. Return whether a skeleton is shown because shapes are missing."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)

@@ -68,7 +68,7 @@ _OTHER_SIGNS_ERROR_RATIO = 0.5
 #: A table with fitted translations is a start table if its tip error is at most this fraction of the reach.
 _CLOSE_START = 1e-6
 #: Large changes (rad), which the fit adds to theta_i and subtracts from theta_{i+1}.
-#: If cos(alpha_i) < 0, the axes point in opposite directions, and the fit adds the change to both.
+#: If cos(alpha_i) < 0, the fit adds the change to theta_{i+1} too, because the axes have opposite directions.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: `count` and `beam_width` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)
@@ -287,7 +287,7 @@ def _orthonormal_basis(columns: FloatArray) -> FloatArray:
 
 
 def find_compensated_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Find the cells (row, column) with the same effect on the tip as free parameters."""
+    """Find the cells (row, column) that free parameters can compensate, because the effects are equal."""
     _, free_derivatives, cell_derivatives = tip_poses_and_derivatives(model, targets)
     Q = _orthonormal_basis(free_derivatives)
     remaining = np.linalg.norm(cell_derivatives - Q @ (Q.T @ cell_derivatives), axis=0)
@@ -356,7 +356,7 @@ def start_models(
         model = replace(TableArrays.of(standard), senses=senses, base=alignment.base, tool=alignment.tool)
         model.cells[range(len(senses)), model.variable_indices] += alignment.offsets
         yield model
-        # Near a nearly parallel axis, a prismatic joint's offset can be wrong by hundreds of metres.
+        # If axes are nearly parallel, a prismatic joint's offset can be wrong by hundreds of metres.
         # The steps of a fit are too short for this offset.
         moved = _fit_translations(model, targets)
         metres, radians = targets.largest_errors(moved)

@@ -36,9 +36,8 @@ _MAX_FITS = 3
 _PARALLEL_TILT = 2e-2
 #: Cost of a difference from the file's interpretation, as a fraction of the smallest shape difference.
 _DIFFERENCE_COST_RATIO = 0.1
-#: A tip error within the tolerance ends the search for a better interpretation.
-#: A larger tip error must be at most this fraction of the smaller of two lengths.
-#: The lengths are the reach, and the tip error of the interpretation that the file states.
+#: A better interpretation has a tip error within the tolerance, or at most this fraction of two lengths.
+#: One length is the reach. The other length is the tip error of the interpretation that the file states.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)

@@ -70,7 +70,7 @@ class _PartialAlignment:
     Rz(phi_in) Tz(delta_in) leads from the last joint's DH frame to its URDF frame.
     """
 
-    cost: float  # Weighted difference of cells, plus the cost of reversed joints (m).
+    cost: float  # Weighted sum (m) of the differences of cells, and a penalty for each reversed joint.
     senses: tuple[int, ...]
     offsets: tuple[float, ...]  # The last joint's offset is missing.
     phi_in: float

@@ -313,8 +313,8 @@ def make_identifier(name: str) -> str:
 def encode_usd_name(name: str) -> str:
     """Transcode a name as `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    An identifier is returned unchanged. Every other name is encoded as "tn__", the kept characters, "_" if
-    any character is kept, and numbers. The kept characters are ASCII letters, digits and "_". Each other
+    An identifier is returned unchanged. The code of any other name begins with "tn__" and the kept
+    characters: ASCII letters, digits and "_". If there are kept characters, "_" follows. Each other
     character gives the number d n + p in base 62, as in Punycode, in the order of the code points:
 
     | Symbol | Meaning |

@@ -374,7 +374,7 @@ def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoice
         X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
         if np.abs(change).max() < _NEGLIGIBLE_CHANGE:
             break
-        # If two axes nearly coincide, an offset can become many turns. Large angles have large rounding.
+        # If two axes nearly coincide, a step can add many turns. Large angles have large rounding errors.
         offsets = np.where(turns & (np.abs(offsets) > pi), np.remainder(offsets + pi, 2.0 * pi) - pi, offsets)
     joints = alignment.a.tree.joints
     zeros = {joints[s.a].name: (s.sense, float(x)) for s, x in zip(alignment.steps, offsets, strict=True)}

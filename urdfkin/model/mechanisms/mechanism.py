@@ -304,7 +304,7 @@ class Mechanism:
     def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy of the mechanism with the joints `names` in this order.
 
-        `allows_order` must be true. The copy omits a link if different joints move it in the new order.
+        `allows_order` must be true. A link between two joints that change places is omitted.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]

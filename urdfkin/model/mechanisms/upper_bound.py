@@ -270,7 +270,7 @@ def upper_bounds(
 def joints_from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints from the first difference to a frame, and the values of these joints."""
+    """Return the joint pairs on a frame's path from the first difference on, and the values of the joints."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))

@@ -274,8 +274,9 @@ class FindingFilter:
 def find_known_findings(
     text: UrdfText, version: CommitFiles, examine: Callable[[UrdfText], Examination]
 ) -> Baseline | None:
-    """Return the findings of the older version of a file; None if all current findings are known.
+    """Return the findings of the older version of a file.
 
+    The result is None if the older version certainly has all current findings.
     All findings of an unchanged file are known, with two exceptions:
 
     - All findings of a xacro file are new if a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed.
