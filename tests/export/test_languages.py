@@ -665,3 +665,9 @@ def test_an_export_adds_no_line_to_the_robots_certificate() -> None:
     robot = urdfkin.load("planar_two_link")
     robot.export("numpy")
     assert not robot.certificate().lines
+
+
+def test_a_latex_document_escapes_the_whole_name_of_a_joint_with_a_colon() -> None:
+    arm = urdfs.built(joint("axis 1: j_1", "revolute", "a", "b", axis="0 1 0", more=limit()))
+    text = arm.export("latex", quantities=["placement"])
+    assert "\naxis 1: j\\_1 is revolute" in text
