@@ -95,6 +95,23 @@ def test_wrong_columns_of_poses_are_reported(header: str, words: str, tmp_path: 
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize("name", ["x", "qw"])
+def test_a_coordinate_with_the_name_of_a_pose_column_is_refused_for_positions_only(
+    name: str, tmp_path: Path
+) -> None:
+    for header in ("x,y,z", "a,x,y,z", f"{name},x,y,z,qx,qy,qz,qw"):
+        path = csv(tmp_path / "x.csv", header, np.ones((2, header.count(",") + 1)))
+        with pytest.raises(
+            InputError, match=f"have the same name: found {name}; give the poses as the columns T00"
+        ):
+            read_poses(path, (name,), (name,))
+    matrices = ",".join(f"T{i}{j}" for i in range(3) for j in range(4))
+    path = csv(tmp_path / "T.csv", f"{name},{matrices}", np.hstack([Q[:, :1], T[:, :3].reshape(3, 12)]))
+    q, found = read_poses(path, (name,), (name,))
+    assert (q == Q[:, :1]).all()
+    np.testing.assert_allclose(found, T, atol=1e-15)
+
+
 def test_wrong_arrays_of_poses_are_reported(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
     with pytest.raises(InputError, match="`q` and `T`, `q` and `p`, or `q`, `p` and `quat`: found q, T, p"):

@@ -660,19 +660,26 @@ def _read_csv_poses(
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
     kind = _MATRIX_COLUMNS if "T00" in names else _POSITION_COLUMNS
+    pose_rest = _QUATERNION_COLUMNS if kind is _POSITION_COLUMNS else _LAST_ROW_COLUMNS
+    if ambiguous := [name for name in required_coordinates if name in (*kind, *pose_rest)]:
+        raise InputError(
+            "a coordinate and a column of the measured poses have the same name",
+            where=where,
+            found=", ".join(ambiguous),
+            remedy=(
+                "give the poses as the columns T00 to T23, or give an .npz file"
+                if kind is _POSITION_COLUMNS
+                else "give an .npz file"
+            ),
+        )
     others = [name for name in coordinates if name not in required_coordinates]
-    optional = [
-        *others,
-        "sample",
-        "t",
-        *(_QUATERNION_COLUMNS if kind is _POSITION_COLUMNS else _LAST_ROW_COLUMNS),
-    ]
+    optional = [*others, "sample", "t", *pose_rest]
     required = [*required_coordinates, *kind]
     data = read_columns(text, where, "measured poses", required, optional, requires_header=True, units=units)
     s = len(data[kind[0]])
     values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, default_q, strict=True)]
     q = np.stack(values, axis=-1) if values else np.empty((s, 0))
-    part = [name for name in _QUATERNION_COLUMNS if name in data]
+    part = [name for name in _QUATERNION_COLUMNS if name in data and kind is _POSITION_COLUMNS]
     if 0 < len(part) < len(_QUATERNION_COLUMNS):
         missing = ", ".join(name for name in _QUATERNION_COLUMNS if name not in part)
         raise InputError(
