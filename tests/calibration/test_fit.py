@@ -196,6 +196,31 @@ def test_invalid_calibration_input_is_reported(change: dict[str, object], words:
     assert words in str(error.value)
 
 
+def test_configurations_of_a_robot_or_a_table_can_be_given_by_name() -> None:
+    class Table:
+        """A table with columns in another order than the robot's coordinates."""
+
+        def __init__(self, columns: dict[str, FloatArray]) -> None:
+            self.columns, self._by_name = list(columns), columns
+
+        def __getitem__(self, name: str) -> FloatArray:
+            return self._by_name[name]
+
+        def __array__(self, dtype: object = None, copy: object = None) -> FloatArray:
+            return np.stack(list(self._by_name.values()), axis=-1)
+
+    robot, dh = load("ur5", verify=False), table(DHConvention.STANDARD)
+    q = robot.sample(20, seed=1)
+    for source, names in ((robot, robot.coordinate_names), (dh, dh.joint_names)):
+        values = q[:, : len(names)]
+        poses = robot.placement(q, "tool0") if source is robot else dh.placement(values)
+        named = dict(zip(names, values.T, strict=True))
+        right = calibrate(source, values, poses, fit=["offsets"])
+        for given in (named, Table(dict(reversed(named.items())))):
+            found = calibrate(source, given, poses, fit=["offsets"])  # type: ignore[arg-type]
+            assert (found.changes == right.changes).all()
+
+
 def test_a_joint_value_of_a_table_must_be_finite() -> None:
     dh = table(DHConvention.STANDARD)
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(dh.joint_names)))

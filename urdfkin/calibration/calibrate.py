@@ -349,6 +349,8 @@ def fit_model(
             model, general, full_poses=full_poses, parameter_values=_values_with_assumed_target(model)
         )
         return Calibration(robot, model, identifiable, identifiable)
+    if not isinstance(source, DHTable):
+        q = np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
     path_q, measurements = _check_measured(robot, model, q, poses)
     data, calibration = _fit(robot, model, path_q, measurements, noise, drop_outliers, write_all=write_all)
     identifiable = identify(
@@ -357,12 +359,7 @@ def fit_model(
     calibration = replace(calibration, general_identification=identifiable)
     if check:
         calibration = replace(calibration, plausibility=check_plausibility(data, radians=radians))
-    return replace(
-        calibration,
-        certificate=_verify_written(
-            calibration, measurements, np.atleast_2d(np.asarray(q, dtype=np.float64))
-        ),
-    )
+    return replace(calibration, certificate=_verify_written(calibration, measurements, q))
 
 
 def _values_with_assumed_target(model: CalibrationModel) -> FloatArray:
@@ -386,9 +383,7 @@ def _check_measured(
     if isinstance(model.source, DHTable):
         path_q = as_finite(model.coupling.parse(q, "q"), "q")
     else:
-        path_q = model.coupling.select(
-            robot.tree, np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
-        )
+        path_q = model.coupling.select(robot.tree, q)
     values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(
