@@ -66,8 +66,7 @@ def make_chain_code(
         # The user did not write the generated URDF, so warnings about it do not help.
         warnings.simplefilter("ignore", UrdfWarning)
         robot = get_hook("a robot of a source")(chain, verify=verify)
-    tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
-    frame = robot.tree.frame_name(robot.link_names.index(tip))
+    frame = robot.tree.frame_name(robot.link_names.index(link_names(chain)[-1]))
     if quantities is None:
         quantities = DEFAULT_QUANTITIES if robot.nv else DEFAULT_QUANTITIES[:1]
     return make_verified_code(
