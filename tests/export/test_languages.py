@@ -575,6 +575,17 @@ def test_the_check_accepts_each_suffix_that_selects_a_compiled_language(tmp_path
         assert check(path).verified
 
 
+@pytest.mark.parametrize("suffix", [".c", ".C", ".PY"])
+def test_the_check_accepts_the_line_ends_of_windows_and_a_suffix_in_capitals(
+    suffix: str, tmp_path: Path
+) -> None:
+    need("c" if suffix.lower() == ".c" else "numpy")
+    path = tmp_path / f"arm{suffix}"
+    good("export", "planar_two_link", "--quantity", "placement", "-o", str(path))
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert check(path).verified
+
+
 def test_an_invalid_export_is_refused_with_the_valid_choices() -> None:
     robot = urdfkin.load("planar_two_link")
     asked: tuple[tuple[tuple[Any, ...], type[Exception], str], ...] = (
