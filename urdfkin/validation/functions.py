@@ -598,7 +598,7 @@ class _Run:
                 f" factor={math.ceil(total.bound_ratio * self.factor)} accepts them"
             )
             return
-        mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
+        mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion, self.options)
         first = slice(_DIAGNOSIS_SAMPLES)
         inputs = tuple(x[first_batch.valid_indices[first]] for x in first_batch.inputs)
         case = DiagnosisCase(
