@@ -9,7 +9,7 @@ import pytest
 from tests import urdfs
 from tests.calibration.arms import BRANCHED, bench
 from tests.calibration.test_parameters import table
-from tests.cli.running import Done, good, urdfkin
+from tests.cli.running import Done, good, refused, urdfkin
 from urdfkin.calibration.parameters import make_table_model
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table
@@ -66,6 +66,19 @@ def test_the_calibration_of_a_table_file_writes_a_table(tmp_path: Path) -> None:
     out = tmp_path / "new.toml"
     good("calibrate", f"{tmp_path}/arm.toml", "--poses", f"{tmp_path}/poses.npz", "-o", str(out))
     assert np.abs(read_table(out).placement(q) - model.chain.poses(q, truth)).max() < 1e-13
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["--lock joint_2=0.3", "--joints joint_2", "--no-mimic", "--root-joint floating", "--convention drake"],
+)
+def test_options_of_a_robot_are_refused_for_a_table(option: str, tmp_path: Path) -> None:
+    drawn = table(DHConvention.STANDARD)
+    (tmp_path / "arm.toml").write_text(export(drawn, "toml"))
+    np.savez(tmp_path / "poses.npz", q=np.zeros((2, 4)), p=np.zeros((2, 3)))
+    option = option.replace("joint_2", drawn.joint_names[1])
+    words = refused("calibrate", f"{tmp_path}/arm.toml", *option.split(), "--poses", f"{tmp_path}/poses.npz")
+    assert "does nothing for a table" in words
 
 
 _COUPLED = urdfs.robot(
