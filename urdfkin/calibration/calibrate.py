@@ -611,12 +611,13 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest accepted error of a rotation matrix, or of the length of a quaternion.
+#: Largest accepted error of a rotation matrix, of a pose's last row, or of the length of a quaternion.
 #: The tolerance is large, because numbers in files are rounded.
 _ROTATION_TOLERANCE = 1e-3
 _POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW_COLUMNS = tuple(f"T3{j}" for j in range(4))
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 METRES_PER_UNIT = {"m": 1.0, "mm": 1e-3}
 
 
@@ -681,9 +682,10 @@ def _read_csv_poses(
             "a quaternion needs four columns: qx, qy, qz, qw", where=where, found=f"no {missing}"
         )
     if kind is _MATRIX_COLUMNS:
-        rows = np.stack([data[name] for name in _MATRIX_COLUMNS], axis=-1).reshape(s, 3, 4)
-        T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
-        return q, _with_exact_rotations(T, where)
+        last_row = zip(_LAST_ROW_COLUMNS, _LAST_ROW, strict=True)
+        cells = [data[name] for name in _MATRIX_COLUMNS]
+        cells += [data.get(name, np.full(s, x)) for name, x in last_row]
+        return q, _with_exact_rotations(np.stack(cells, axis=-1).reshape(s, 4, 4), where)
     p = np.stack([data[name] for name in _POSITION_COLUMNS], axis=-1)
     return q, p if not part else _with_quaternions(
         p, np.stack([data[n] for n in _QUATERNION_COLUMNS], axis=-1), where
@@ -725,14 +727,15 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     R = T[:, :3, :3]
     wrong = rotation_defect(R) > _ROTATION_TOLERANCE
+    wrong |= (np.abs(T[:, 3] - _LAST_ROW) > _ROTATION_TOLERANCE).any(axis=-1)
     if wrong.any():
         raise InputError(
-            "a pose must be a rotation and a translation",
+            "a pose must be a rotation and a translation, with the last row 0 0 0 1",
             where=f"{where}, pose {int(wrong.argmax())}",
             found=str(T[wrong.argmax()].tolist()),
         )
     exact = T.copy()
-    exact[:, :3, :3] = polar_factor(R)
+    exact[:, :3, :3], exact[:, 3] = polar_factor(R), _LAST_ROW
     return exact
 
 
