@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from scipy.linalg import expm
 
-from tests import urdfs
 from tests.cli.running import good
 from tests.random_chains import trees
 from urdfkin.dh.export.toolboxes import write_screws
@@ -20,7 +19,7 @@ from urdfkin.dh.screws import make_screws, screws_from_rows
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import make_chain
-from urdfkin.model.tree import FloatArray, KinematicTree, LinkFrame
+from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot.loading import load
 from urdfkin.verify.conversions import check_screws
 from urdfkin.verify.oracle import QueryBatch
@@ -164,37 +163,3 @@ def test_an_error_in_a_screw_file_is_reported_with_the_position(tmp_path: Path) 
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nscrews = []\n")
     with pytest.raises(InputError, match="unknown key in the table of screws: found 'screws'"):
         load(path)
-
-
-_PARENT = urdfs.joint("j", "revolute", "a", "b", axis="0 1 0", more=urdfs.limit())
-
-
-@pytest.mark.parametrize(
-    ("joints", "tip"),
-    [
-        ([urdfs.joint("tip", "revolute", "a", "tip", 'xyz="1 2 3"', more=urdfs.limit())], "tip"),
-        ([urdfs.joint("tip", "revolute", "a", "tip_link", 'xyz="1 2 3"', more=urdfs.limit())], "tip_link"),
-        ([urdfs.joint("tip_fixed", "revolute", "a", "tip", 'xyz="1 2 3"', more=urdfs.limit())], "tip"),
-        ([_PARENT], "a"),
-        (
-            [_PARENT, urdfs.joint("k", "prismatic", "a", "tip", more=urdfs.mimic("j", 0.5) + urdfs.limit())],
-            "tip",
-        ),
-    ],
-    ids=["joint and tip", "link of a joint", "fixed joint", "base", "mimicked joint outside the path"],
-)
-def test_screws_with_equal_names_or_a_mimicked_joint_elsewhere_are_a_robot_and_are_exported(
-    joints: list[str], tip: str
-) -> None:
-    robot = urdfs.built(*joints)
-    screws, scope = robot.screws(tip), dict[str, Any]()
-    exec(robot.export("numpy", tip, ["placement"], form="screws"), scope)
-    again = urdfs.loaded(screws)
-    q = robot.sample(5, seed=1)
-    own = screws.coupling.select(robot.tree, q)
-    T = robot.placement(q, tip)
-    frame = LinkFrame.of(again.link_names[len(screws.joints) + 1])
-    whole = np.zeros((5, again.nq))
-    whole[:, [again.coordinate_names.index(name) for name in screws.coupling.names]] = own
-    np.testing.assert_allclose(again.placement(whole, frame), T, atol=1e-15)
-    np.testing.assert_allclose(scope["placement"](whole), T, atol=1e-15)

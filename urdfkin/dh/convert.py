@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,9 +32,6 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 from urdfkin.urdf.writer import to_urdf as write_urdf
-
-if TYPE_CHECKING:
-    from urdfkin.dh.screws import ProductOfExponentials
 
 
 def to_convention(table: DHTable, convention: str) -> DHTable:
@@ -69,8 +65,23 @@ def to_tree(table: DHTable) -> KinematicTree:
 
     A mimicked joint without a row becomes a joint on the base.
     """
+    links = link_names(table)
     joints = _serial_joints(table, [(_tree_kind(row), _tree_limit(row), row.mimic) for row in table.rows])
-    return make_serial_tree(table.robot, link_names(table), joints)
+    triples = list(zip(joints, links, links[1:], strict=False))
+    names = {row.joint for row in table.rows}
+    for mimicked_joint in table.joint_names:
+        if mimicked_joint not in names:
+            turns = next(
+                row.kind.turns
+                for row in table.rows
+                if row.mimic and row.mimic.mimicked_joint == mimicked_joint
+            )
+            kind, limit = (
+                (JointKind.CONTINUOUS, None) if turns else (JointKind.PRISMATIC, DEFAULT_PRISMATIC_LIMIT)
+            )
+            joint = Joint(mimicked_joint, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
+            triples.append((joint, links[0], make_unique(f"{mimicked_joint}_link", links)))
+    return build_tree(table.robot, links[0], triples)
 
 
 def to_urdf(table: DHTable) -> str:
@@ -88,9 +99,9 @@ def to_free_tree(table: DHTable) -> KinematicTree:
 def make_serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) -> KinematicTree:
     """Connect links i and i + 1 by joint i.
 
-    A mimicked joint that is not among the joints becomes a joint on the base.
+    A mimicked joint that is not among the joints becomes a joint on the base. The tip is the last link.
     """
-    triples, names = list(zip(joints, links, links[1:], strict=False)), {joint.name for joint in joints}
+    triples, names = list[tuple[Joint, str, str]](), {joint.name for joint in joints}
     for joint in joints:
         if joint.mimic and (name := joint.mimic.mimicked_joint) not in names:
             names.add(name)
@@ -100,8 +111,8 @@ def make_serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) 
                 else (JointKind.PRISMATIC, DEFAULT_PRISMATIC_LIMIT)
             )
             mimicked_joint = Joint(name, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
-            triples.append((mimicked_joint, links[0], _make_unique(f"{name}_link", links)))
-    return build_tree(robot, links[0], triples)
+            triples.append((mimicked_joint, links[0], make_unique(f"{name}_link", list(links))))
+    return build_tree(robot, links[0], [*triples, *zip(joints, links, links[1:], strict=False)])
 
 
 def _serial_joints(
@@ -112,17 +123,8 @@ def _serial_joints(
         Joint(row.joint, kind, 0, T, np.array([0.0, 0.0, float(row.sense)]), limit, mimic)
         for row, T, (kind, limit, mimic) in zip(table.rows, poses, details, strict=True)
     ]
-    return [*joints, make_tip_joint(table.tip_frame, T_tip, joints)]
-
-
-def make_tip_joint(tip: str, T_parent_tip: FloatArray, joints: Sequence[Joint]) -> Joint:
-    """Return a fixed joint with a name that neither `joints` nor their mimic rules contain."""
-    taken = [
-        name for joint in joints for name in (joint.name, joint.mimic and joint.mimic.mimicked_joint) if name
-    ]
-    return Joint(
-        _make_unique(f"{tip}_fixed", taken), JointKind.FIXED, 0, T_parent_tip, np.array([1.0, 0.0, 0.0])
-    )
+    name = make_unique(f"{table.tip_frame}_fixed", [*(row.joint for row in table.rows), *table.joint_names])
+    return [*joints, Joint(name, JointKind.FIXED, 0, T_tip, np.array([1.0, 0.0, 0.0]))]
 
 
 def relative_frame_poses(table: DHTable) -> list[FloatArray]:
@@ -139,19 +141,19 @@ def relative_frame_poses(table: DHTable) -> list[FloatArray]:
     return [table.base @ first, *poses, np.array(table.tool)]
 
 
-def link_names(chain: DHTable | ProductOfExponentials) -> list[str]:
-    """Return unique names of the base, of each joint's child link, and of the tip."""
-    joints = (
-        [row.joint for row in chain.rows]
-        if isinstance(chain, DHTable)
-        else [joint.name for joint in chain.joints]
-    )
-    names = [chain.base_frame]
-    names += [_make_unique(f"{joint}_link", [*names, chain.tip_frame]) for joint in joints]
-    return [*names, _make_unique(chain.tip_frame, names)]
+def link_names(table: DHTable) -> list[str]:
+    return make_link_names(table.base_frame, [row.joint for row in table.rows], table.tip_frame)
 
 
-def _make_unique(name: str, taken: Sequence[str]) -> str:
+def make_link_names(base: str, joints: Sequence[str], tip: str) -> list[str]:
+    """Return different names of the links of a serial chain."""
+    names = [base]
+    for joint in joints:
+        names.append(make_unique(f"{joint}_link", [*names, tip]))
+    return [*names, make_unique(tip, names)]
+
+
+def make_unique(name: str, taken: list[str]) -> str:
     while name in taken:
         name += "_"
     return name

@@ -18,12 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.convert import (
-    DEFAULT_PRISMATIC_LIMIT,
-    link_names,
-    make_serial_tree,
-    make_tip_joint,
-)
+from urdfkin.dh.convert import DEFAULT_PRISMATIC_LIMIT, make_link_names, make_serial_tree, make_unique
 from urdfkin.dh.export.text import pose_matrix
 from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
@@ -206,6 +201,8 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
         ('base', 'joint_1_link', 'joint_2_link', 'tip')
         """
+        names = [joint.name for joint in self.joints]
+        links = make_link_names(self.base_frame, names, self.tip_frame)
         joints, origin = list[Joint](), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
             limit = joint.limit if joint.kind.turns else joint.limit or DEFAULT_PRISMATIC_LIMIT
@@ -213,9 +210,10 @@ class ProductOfExponentials(Displayable):
             T = pose(p=point - origin)
             joints.append(Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic))
             origin = point
-        T_tip = pose(p=-origin) @ self.M
-        joints.append(make_tip_joint(self.tip_frame, T_tip, joints))
-        return make_serial_tree(self.robot, link_names(self), joints)
+        T_tip, axis = pose(p=-origin) @ self.M, np.array([1.0, 0.0, 0.0])
+        fixed = make_unique(f"{self.tip_frame}_fixed", names)
+        joints.append(Joint(fixed, JointKind.FIXED, 0, T_tip, axis))
+        return make_serial_tree(self.robot, links, joints)
 
     def as_mapping(self) -> dict[str, Any]:
         """Return plain data for `screws_from_mapping`, without mimic rules and limits.

@@ -190,7 +190,7 @@ def _load_table(
     **options: Unpack[LoadOptions],
 ) -> Robot:
     from urdfkin.dh.compare.hypotheses import find_table_warnings
-    from urdfkin.dh.convert import link_names, to_urdf
+    from urdfkin.dh.convert import to_urdf
     from urdfkin.dh.parse_table import read_table_or_screws
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
@@ -214,7 +214,8 @@ def _load_table(
     if as_verify(options["verify"]):
         verifier = _load_without_options(robot, text).verifier
         if isinstance(table, ProductOfExponentials):
-            base, *_, tip = map(LinkFrame.of, link_names(table))
+            links = verifier.tree.links
+            base, tip = LinkFrame.of(links[0]), LinkFrame.of(links[-1])
             check_screws(verifier, replace(table, base_frame=base, tip_frame=tip))
         else:
             check_table_source(verifier, table)
