@@ -14,7 +14,7 @@ from tests.calibration.arms import BRANCHED, pose
 from tests.cli.running import urdfkin
 from tests.reading import present
 from tests.urdfs import joint, limit
-from urdfkin.calibration.calibrate import read_poses
+from urdfkin.calibration.calibrate import as_pose_array, read_poses
 from urdfkin.calibration.universal_robots import (
     PARENT_JOINTS,
     apply_factory_calibration,
@@ -93,6 +93,36 @@ def test_wrong_columns_of_poses_are_reported(header: str, words: str, tmp_path: 
     with pytest.raises(InputError) as error:
         read_poses(path, NAMES, NAMES)
     assert words in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["x", "qw"])
+def test_a_coordinate_with_the_name_of_a_pose_column_is_refused_for_positions_only(
+    name: str, tmp_path: Path
+) -> None:
+    for header in ("x,y,z", "a,x,y,z", f"{name},x,y,z,qx,qy,qz,qw"):
+        path = csv(tmp_path / "x.csv", header, np.ones((2, header.count(",") + 1)))
+        with pytest.raises(
+            InputError, match=f"have the same name: found {name}; give the poses as the columns T00"
+        ):
+            read_poses(path, (name,), (name,))
+    matrices = ",".join(f"T{i}{j}" for i in range(3) for j in range(4))
+    path = csv(tmp_path / "T.csv", f"{name},{matrices}", np.hstack([Q[:, :1], T[:, :3].reshape(3, 12)]))
+    q, found = read_poses(path, (name,), (name,))
+    assert (q == Q[:, :1]).all()
+    np.testing.assert_allclose(found, T, atol=1e-15)
+
+
+def test_transposed_poses_are_refused_in_every_form(tmp_path: Path) -> None:
+    transposed = np.stack([elementary_pose(2, True, 0.0)] * 3)
+    transposed[:, 3, :3] = T[:, :3, 3]
+    header = f"a,b,{','.join(f'T{i}{j}' for i in range(4) for j in range(4))}"
+    file = csv(tmp_path / "T.csv", header, np.hstack([Q, transposed.reshape(3, 16)]))
+    np.savez(tmp_path / "T.npz", q=Q, T=transposed)
+    for path in (file, tmp_path / "T.npz"):
+        with pytest.raises(InputError, match=r"pose 0: a pose must be .*, with the last row 0 0 0 1"):
+            read_poses(path, NAMES, NAMES)
+    with pytest.raises(InputError, match="with the last row 0 0 0 1"):
+        as_pose_array(transposed)
 
 
 def test_wrong_arrays_of_poses_are_reported(tmp_path: Path) -> None:

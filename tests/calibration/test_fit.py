@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from tests import urdfs
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
 from tests.calibration.test_parameters import table
 from tests.reading import present
@@ -194,6 +195,44 @@ def test_invalid_calibration_input_is_reported(change: dict[str, object], words:
     with pytest.raises(InputError) as error:
         calibrate(load("ur5", verify=False), **arguments)  # type: ignore[arg-type]
     assert words in str(error.value)
+
+
+def test_a_target_beside_the_axis_of_a_turntable_is_not_taken_for_millimetres() -> None:
+    axis = urdfs.joint("turn", "continuous", "a", "table", 'xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"', "0 0 1")
+    robot = load(urdfs.robot(axis), verify=False)
+    q = np.linspace(-3.0, 3.0, 20)[:, np.newaxis]
+    poses = robot.placement(q, "table") @ pose(2, 0.3)
+    found = calibrate(robot, q, poses, tip="table", fit=["tool", "origins"])
+    assert present(found.full_fit).rms()[0] < 1e-14
+    millimetres = poses.copy()
+    millimetres[:, :3, 3] *= 1e3
+    with pytest.raises(InputError, match="add --unit mm"):
+        calibrate(robot, q, millimetres, tip="table", fit=["tool", "origins"])
+
+
+def test_configurations_of_a_robot_or_a_table_can_be_given_by_name() -> None:
+    class Table:
+        """A table with columns in another order than the robot's coordinates."""
+
+        def __init__(self, columns: dict[str, FloatArray]) -> None:
+            self.columns, self._by_name = list(columns), columns
+
+        def __getitem__(self, name: str) -> FloatArray:
+            return self._by_name[name]
+
+        def __array__(self, dtype: object = None, copy: object = None) -> FloatArray:
+            return np.stack(list(self._by_name.values()), axis=-1)
+
+    robot, dh = load("ur5", verify=False), table(DHConvention.STANDARD)
+    q = robot.sample(20, seed=1)
+    for source, names in ((robot, robot.coordinate_names), (dh, dh.joint_names)):
+        values = q[:, : len(names)]
+        poses = robot.placement(q, "tool0") if source is robot else dh.placement(values)
+        named = dict(zip(names, values.T, strict=True))
+        right = calibrate(source, values, poses, fit=["offsets"])
+        for given in (named, Table(dict(reversed(named.items())))):
+            found = calibrate(source, given, poses, fit=["offsets"])  # type: ignore[arg-type]
+            assert (found.changes == right.changes).all()
 
 
 def test_a_joint_value_of_a_table_must_be_finite() -> None:

@@ -225,3 +225,18 @@ def test_a_robot_that_pinocchio_cannot_check_is_reported_once_with_exit_code_3()
 @pytest.mark.parametrize("stdin", [b"", b"\xff\xfe\x00", b"<robot", urdf_of("single_link").encode()[:-3]])
 def test_standard_input_without_a_valid_urdf_is_an_input_error(stdin: bytes) -> None:
     assert "<stdin>" in refused("placement -", stdin=stdin)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "placement planar_two_link --q neutral",
+        "singular-values planar_two_link --q neutral",
+        "export planar_two_link --quantity placement",
+        "verify {folder}/mine.py:placement planar_two_link --samples 1",
+        "plot planar_two_link --from neutral --to 1,1 --output {folder}/x.svg",
+    ],
+)
+def test_an_empty_frame_is_an_error_and_not_the_tip(command: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def placement(q):\n    return q\n")
+    assert "unknown frame ''" in refused(*command.format(folder=tmp_path).split(), "--frame", "")

@@ -26,8 +26,8 @@ from tests.export.writing import ALL, code
 from tests.kinematics.test_roundings import PARTS, most, of_sines, theirs, turn
 from tests.laws.subjects import robot_of
 from tests.reading import present
+from urdfkin.export import FORMS, recursion, write
 from urdfkin.export import exact as exact_module
-from urdfkin.export import recursion, write
 from urdfkin.export.c import fill_template
 from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, evaluate_intervals, format_exact_literal
 from urdfkin.export.expression import Graph, Node, find_dependencies
@@ -304,3 +304,9 @@ def test_at_most_half_an_eps_of_the_largest_number_is_omitted_from_a_constant() 
             assert abs(kept[1] - row[1]) <= 0.5 * EPS * largest
             assert kept[1] == row[1] or share < 0.5
     assert re.search(r"less\s+than\s+half\s+an\s+eps", roundings.__doc__ or "")
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_exact_code_names_the_locked_joints_in_every_form(form: str) -> None:
+    held = arm("0 0 0").with_locked_joints({"k": 0.125})
+    assert "Joint k is locked at 0.125" in held.export("sympy-exact", quantities=["placement"], form=form)

@@ -31,6 +31,7 @@ from urdfkin.export.check import _COMPILE_COMMANDS, check
 from urdfkin.export.proof import format_decimal
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
+from urdfkin.model.tree import LinkFrame
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import precision
 from urdfkin.verify.quantities import QUANTITIES
@@ -575,6 +576,17 @@ def test_the_check_accepts_each_suffix_that_selects_a_compiled_language(tmp_path
         assert check(path).verified
 
 
+@pytest.mark.parametrize("suffix", [".c", ".C", ".PY"])
+def test_the_check_accepts_the_line_ends_of_windows_and_a_suffix_in_capitals(
+    suffix: str, tmp_path: Path
+) -> None:
+    need("c" if suffix.lower() == ".c" else "numpy")
+    path = tmp_path / f"arm{suffix}"
+    good("export", "planar_two_link", "--quantity", "placement", "-o", str(path))
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert check(path).verified
+
+
 def test_an_invalid_export_is_refused_with_the_valid_choices() -> None:
     robot = urdfkin.load("planar_two_link")
     asked: tuple[tuple[tuple[Any, ...], type[Exception], str], ...] = (
@@ -665,3 +677,43 @@ def test_an_export_adds_no_line_to_the_robots_certificate() -> None:
     robot = urdfkin.load("planar_two_link")
     robot.export("numpy")
     assert not robot.certificate().lines
+
+
+def test_a_latex_document_escapes_the_whole_name_of_a_joint_with_a_colon() -> None:
+    arm = urdfs.built(joint("axis 1: j_1", "revolute", "a", "b", axis="0 1 0", more=limit()))
+    text = arm.export("latex", quantities=["placement"])
+    assert "\naxis 1: j\\_1 is revolute" in text
+
+
+_PARENT = joint("j", "revolute", "a", "b", axis="0 1 0", more=limit())
+
+
+@pytest.mark.parametrize(
+    ("joints", "tip"),
+    [
+        ([joint("tip", "revolute", "a", "tip", 'xyz="1 2 3"', more=limit())], "tip"),
+        ([joint("tip", "revolute", "a", "tip_link", 'xyz="1 2 3"', more=limit())], "tip_link"),
+        ([joint("tip_fixed", "revolute", "a", "tip", 'xyz="1 2 3"', more=limit())], "tip"),
+        ([_PARENT], "a"),
+        (
+            [_PARENT, joint("k", "prismatic", "a", "tip", more=mimic("j", 0.5) + limit())],
+            "tip",
+        ),
+    ],
+    ids=["joint and tip", "link of a joint", "fixed joint", "base", "mimicked joint outside the path"],
+)
+def test_screws_with_equal_names_or_a_mimicked_joint_elsewhere_are_a_robot_and_are_exported(
+    joints: list[str], tip: str
+) -> None:
+    robot = urdfs.built(*joints)
+    screws, scope = robot.screws(tip), dict[str, Any]()
+    exec(robot.export("numpy", tip, ["placement"], form="screws"), scope)
+    again = urdfs.loaded(screws)
+    q = robot.sample(5, seed=1)
+    own = screws.coupling.select(robot.tree, q)
+    T = robot.placement(q, tip)
+    frame = LinkFrame.of(again.link_names[-1])
+    whole = np.zeros((5, again.nq))
+    whole[:, [again.coordinate_names.index(name) for name in screws.coupling.names]] = own
+    np.testing.assert_allclose(again.placement(whole, frame), T, atol=1e-15)
+    np.testing.assert_allclose(scope["placement"](whole), T, atol=1e-15)

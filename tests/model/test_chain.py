@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,6 +96,21 @@ def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
     np.testing.assert_array_equal(path.placement("neutral, left_knee=0.4"), path.placement([0.0, 0.4]))
     with pytest.raises(UnknownNameError, match="left_knee"):
         path.placement({"left_nee": 0.4})
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        np.ma.masked_array([0.1, 0.4], [True, False]),
+        np.array([0.1 + 1.0j, 0.4]),
+        np.array(["0.1", "0.4"]),
+        np.array([None, 0.4]),
+        np.array(["2026-01-01", "2026-01-02"], dtype="datetime64[D]"),
+    ],
+)
+def test_coordinates_of_a_path_must_be_real_numbers(q: Any, walker: KinematicTree) -> None:
+    with pytest.raises(InputError, match="q must be real numbers"):
+        make_chain(walker, "left_foot").placement(q)
 
 
 def test_a_missing_name_raises_an_error(walker: KinematicTree) -> None:

@@ -425,6 +425,33 @@ def test_a_function_that_only_raises_exceptions_has_no_diagnosis() -> None:
     assert (found.agrees, found.errors, found.diagnoses) == (False, 1, ())
 
 
+@pytest.mark.parametrize("convention", ["mujoco", "pinocchio"])
+def test_a_wrong_function_of_a_convention_with_values_of_mimic_joints_is_reported(convention: str) -> None:
+    robot = robot_of("panda")
+    own = robot.convention(convention)
+
+    def shifted(q: np.ndarray) -> np.ndarray:
+        return robot.placement(own.from_(q), "panda_hand") + 1.0
+
+    options: dict[str, Any] = {"frame": "panda_hand", "convention": convention, "samples": 5}
+    found = verify_function(shifted, robot, "placement", **options)
+    assert (found.agrees, found.errors, found.diagnoses) == (False, 0, ())
+
+
+def test_the_diagnosis_of_a_robot_with_mimic_joints_uses_the_options_of_the_quantity() -> None:
+    robot, free = robot_of("panda"), urdfkin.load("panda", mimic=False)
+    names = [free.coordinate_names.index(name) for name in robot.coordinate_names]
+
+    def without_mimic(q: np.ndarray) -> np.ndarray:
+        whole = np.zeros(free.nq)
+        whole[names] = q
+        return free.relative_placement(whole, "panda_rightfinger", "panda_link5")
+
+    options = {"frame": "panda_rightfinger", "relative_to": "panda_link5", "samples": 5}
+    found = verify_function(without_mimic, robot, "relative placement", **options)
+    check_diagnosis(found, "the mimic joints ('panda_finger_joint2') do not move")
+
+
 def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_locked_robot_is_named() -> None:
     robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees

@@ -349,6 +349,8 @@ def fit_model(
             model, general, full_poses=full_poses, parameter_values=_values_with_assumed_target(model)
         )
         return Calibration(robot, model, identifiable, identifiable)
+    if not isinstance(source, DHTable):
+        q = np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
     path_q, measurements = _check_measured(robot, model, q, poses)
     data, calibration = _fit(robot, model, path_q, measurements, noise, drop_outliers, write_all=write_all)
     identifiable = identify(
@@ -357,12 +359,7 @@ def fit_model(
     calibration = replace(calibration, general_identification=identifiable)
     if check:
         calibration = replace(calibration, plausibility=check_plausibility(data, radians=radians))
-    return replace(
-        calibration,
-        certificate=_verify_written(
-            calibration, measurements, np.atleast_2d(np.asarray(q, dtype=np.float64))
-        ),
-    )
+    return replace(calibration, certificate=_verify_written(calibration, measurements, q))
 
 
 def _values_with_assumed_target(model: CalibrationModel) -> FloatArray:
@@ -386,9 +383,7 @@ def _check_measured(
     if isinstance(model.source, DHTable):
         path_q = as_finite(model.coupling.parse(q, "q"), "q")
     else:
-        path_q = model.coupling.select(
-            robot.tree, np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
-        )
+        path_q = model.coupling.select(robot.tree, q)
     values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(
@@ -616,12 +611,13 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest accepted error of a rotation matrix, or of the length of a quaternion.
+#: Largest accepted error of a rotation matrix, of a pose's last row, or of the length of a quaternion.
 #: The tolerance is large, because numbers in files are rounded.
 _ROTATION_TOLERANCE = 1e-3
 _POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW_COLUMNS = tuple(f"T3{j}" for j in range(4))
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 METRES_PER_UNIT = {"m": 1.0, "mm": 1e-3}
 
 
@@ -660,28 +656,36 @@ def _read_csv_poses(
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
     kind = _MATRIX_COLUMNS if "T00" in names else _POSITION_COLUMNS
+    pose_rest = _QUATERNION_COLUMNS if kind is _POSITION_COLUMNS else _LAST_ROW_COLUMNS
+    if ambiguous := [name for name in required_coordinates if name in (*kind, *pose_rest)]:
+        raise InputError(
+            "a coordinate and a column of the measured poses have the same name",
+            where=where,
+            found=", ".join(ambiguous),
+            remedy=(
+                "give the poses as the columns T00 to T23, or give an .npz file"
+                if kind is _POSITION_COLUMNS
+                else "give an .npz file"
+            ),
+        )
     others = [name for name in coordinates if name not in required_coordinates]
-    optional = [
-        *others,
-        "sample",
-        "t",
-        *(_QUATERNION_COLUMNS if kind is _POSITION_COLUMNS else _LAST_ROW_COLUMNS),
-    ]
+    optional = [*others, "sample", "t", *pose_rest]
     required = [*required_coordinates, *kind]
     data = read_columns(text, where, "measured poses", required, optional, requires_header=True, units=units)
     s = len(data[kind[0]])
     values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, default_q, strict=True)]
     q = np.stack(values, axis=-1) if values else np.empty((s, 0))
-    part = [name for name in _QUATERNION_COLUMNS if name in data]
+    part = [name for name in _QUATERNION_COLUMNS if name in data and kind is _POSITION_COLUMNS]
     if 0 < len(part) < len(_QUATERNION_COLUMNS):
         missing = ", ".join(name for name in _QUATERNION_COLUMNS if name not in part)
         raise InputError(
             "a quaternion needs four columns: qx, qy, qz, qw", where=where, found=f"no {missing}"
         )
     if kind is _MATRIX_COLUMNS:
-        rows = np.stack([data[name] for name in _MATRIX_COLUMNS], axis=-1).reshape(s, 3, 4)
-        T = np.concatenate([rows, np.broadcast_to([[0.0, 0.0, 0.0, 1.0]], (s, 1, 4))], axis=1)
-        return q, _with_exact_rotations(T, where)
+        last_row = zip(_LAST_ROW_COLUMNS, _LAST_ROW, strict=True)
+        cells = [data[name] for name in _MATRIX_COLUMNS]
+        cells += [data.get(name, np.full(s, x)) for name, x in last_row]
+        return q, _with_exact_rotations(np.stack(cells, axis=-1).reshape(s, 4, 4), where)
     p = np.stack([data[name] for name in _POSITION_COLUMNS], axis=-1)
     return q, p if not part else _with_quaternions(
         p, np.stack([data[n] for n in _QUATERNION_COLUMNS], axis=-1), where
@@ -723,14 +727,15 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     R = T[:, :3, :3]
     wrong = rotation_defect(R) > _ROTATION_TOLERANCE
+    wrong |= (np.abs(T[:, 3] - _LAST_ROW) > _ROTATION_TOLERANCE).any(axis=-1)
     if wrong.any():
         raise InputError(
-            "a pose must be a rotation and a translation",
+            "a pose must be a rotation and a translation, with the last row 0 0 0 1",
             where=f"{where}, pose {int(wrong.argmax())}",
             found=str(T[wrong.argmax()].tolist()),
         )
     exact = T.copy()
-    exact[:, :3, :3] = polar_factor(R)
+    exact[:, :3, :3], exact[:, 3] = polar_factor(R), _LAST_ROW
     return exact
 
 

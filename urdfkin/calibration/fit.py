@@ -503,6 +503,9 @@ _TARGET_CONVERGENCE = 1e-9
 #: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
 #: The quotient is about 1000 if positions are in millimetres by mistake.
 _MAX_SPREAD_RATIO = 100.0
+#: The spread of the tip positions counts as at least this fraction of the model's characteristic length.
+#: A tip on the last axis hardly moves, but a target beside the axis does.
+_MIN_SPREAD_OF_LENGTH = 0.1
 
 
 def estimate_start_values(model: CalibrationModel, measurements: Measurements) -> FloatArray:
@@ -592,7 +595,8 @@ def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)
     )
-    if ours > 0.0 and theirs > _MAX_SPREAD_RATIO * ours:
+    least = _MIN_SPREAD_OF_LENGTH * model.chain.characteristic_length
+    if theirs > _MAX_SPREAD_RATIO * max(ours, least):
         raise InputError(
             "the measured positions are much farther apart than the positions of the robot's tip",
             found=f"{theirs:.4g} m, where the robot's tip moves {ours:.4g} m",

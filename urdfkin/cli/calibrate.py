@@ -206,15 +206,20 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     tip, base = options["tip"], options["base"]
     table = read_table_or_screws(options["robot"]) if is_table_file(options["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
+    if source is not robot:
+        # The fit uses the table itself, not the robot that is made of the table.
+        unused = "mimic", "root_joint", "lock", "joints", "convention"
+        reject_unused_options(context, unused, "for a table")
     path = robot.chain(tip, base)
     names: Sequence[str] = path.joint_names if source is robot else source.joint_names
     conversion = find_conversion(robot, options["convention"])
-    coordinates, neutral = robot.coordinate_names if source is robot else names, None
+    coordinates, neutral = (robot.coordinate_names, robot.neutral()) if source is robot else (names, None)
     if conversion is not None:
-        if source is not robot:
-            raise InputError("--convention does nothing for a table", remedy="leave out this option")
         coordinates, neutral = conversion.coordinate_names, conversion.to(robot.neutral())
-        names = [coordinates[i] for name in names for i in conversion.q_and_v_indices[name][0]]
+        # In some conventions, a mimic joint has a coordinate, which must agree with the mimicked joint's.
+        mimics = [j.name for j in robot.tree.joints if j.mimic and j.mimic.mimicked_joint in names]
+        indices = conversion.q_and_v_indices
+        names = [coordinates[i] for name in (*names, *mimics) if name in indices for i in indices[name][0]]
     units = column_units(robot, "q", conversion)
     q, T = (
         read_poses(options["poses"], coordinates, names, options["unit"], units, neutral)

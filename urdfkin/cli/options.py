@@ -469,7 +469,8 @@ def read_inputs(
         q_, v_, a_ = conversion.from_(q_, v_, a_)
     warn_of_limits(robot, q_)
     settings = lock_settings(robot)
-    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, settings=settings, conversion=conversion)
+    frame = robot.tip_frame if frame is None else frame
+    return Inputs(robot, frame, q_, v_, a_, settings=settings, conversion=conversion)
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.convert import DEFAULT_PRISMATIC_LIMIT, make_serial_tree
+from urdfkin.dh.convert import DEFAULT_PRISMATIC_LIMIT, make_link_names, make_serial_tree, make_unique
 from urdfkin.dh.export.text import pose_matrix
 from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
@@ -198,7 +198,8 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
         ('base', 'joint_1_link', 'joint_2_link', 'tip')
         """
-        links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints), self.tip_frame]
+        names = [joint.name for joint in self.joints]
+        links = make_link_names(self.base_frame, names, self.tip_frame)
         joints, origin = list[Joint](), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
             limit = joint.limit if joint.kind.turns else joint.limit or DEFAULT_PRISMATIC_LIMIT
@@ -207,7 +208,8 @@ class ProductOfExponentials(Displayable):
             joints.append(Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic))
             origin = point
         T_tip, axis = pose(p=-origin) @ self.M, np.array([1.0, 0.0, 0.0])
-        joints.append(Joint(f"{self.tip_frame}_fixed", JointKind.FIXED, 0, T_tip, axis))
+        fixed = make_unique(f"{self.tip_frame}_fixed", names)
+        joints.append(Joint(fixed, JointKind.FIXED, 0, T_tip, axis))
         return make_serial_tree(self.robot, links, joints)
 
     def as_mapping(self) -> dict[str, Any]:

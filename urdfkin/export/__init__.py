@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from urdfkin.errors import UnknownNameError
@@ -33,7 +34,11 @@ DEFAULT_QUANTITIES = ("placement", "jacobian", "acceleration")
 
 def code_for_language(code: FrameCode, to: str) -> FrameCode:
     """Return `code`, or the code with exact constants if `to` is sympy-exact."""
-    return code.exact() if to == "sympy-exact" and code.exact is not None else code
+    if to != "sympy-exact" or code.exact is None:
+        return code
+    exact = code.exact()
+    # For a table and for screws, only the proof of `code` contains the locked joints.
+    return replace(exact, maybe_proof=replace(exact.proof, lock=code.proof.lock))
 
 
 def write(code: FrameCode, to: str, file: str | None = None) -> str:

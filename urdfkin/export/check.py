@@ -57,7 +57,6 @@ def insert_seal(text: str) -> str:
 
 def _has_valid_seal(text: str) -> bool | None:
     """Return whether the digest is correct, or None if the text has no digest."""
-    text = text.replace("\r\n", "\n")
     if (found := _SEAL_LINE.search(text)) is None:
         return None
     return _digest(_SEAL_LINE.sub(lambda line: line[1] + _DIGEST_PLACEHOLDER, text, count=1)) == found[2]
@@ -92,11 +91,11 @@ def check(file: Path) -> FileCheck:
     Raises:
         InputError: `urdfkin export` did not write the file, or the file cannot be run.
     """
-    text = read_text(file)
+    text = read_text(file).replace("\r\n", "\n")
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
     runs = {**dict.fromkeys(_COMPILE_COMMANDS, _run_compiled), ".py": _run_imported, ".m": _run_octave}
-    if (run := runs.get(file.suffix)) is None:
+    if (run := runs.get(file.suffix.lower())) is None:
         raise InputError(
             "urdfkin cannot run an exported file of this kind",
             where=str(file),
@@ -132,13 +131,9 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
 
     The check of a CUDA file includes the GPU functions only if nvcc and a GPU are available.
     """
-    name = _find_program_name(_MAIN_MACRO, text, file)
-    copy = _copy(text, folder / f"checked{file.suffix}")
-    command = (
-        _GPU_COMPILE_COMMAND
-        if file.suffix in _CUDA_SUFFIXES and _has_gpu()
-        else _COMPILE_COMMANDS[file.suffix]
-    )
+    name, suffix = _find_program_name(_MAIN_MACRO, text, file), file.suffix.lower()
+    copy = _copy(text, folder / f"checked{suffix}")
+    command = _GPU_COMPILE_COMMAND if suffix in _CUDA_SUFFIXES and _has_gpu() else _COMPILE_COMMANDS[suffix]
     compiler = _find_program(command[0], file)
     for real in ("double", "float"):
         macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]

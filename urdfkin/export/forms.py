@@ -66,7 +66,7 @@ def make_chain_code(
         # The user did not write the generated URDF, so warnings about it do not help.
         warnings.simplefilter("ignore", UrdfWarning)
         robot = get_hook("a robot of a source")(chain, verify=verify)
-    tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
+    tip = link_names(chain)[-1] if isinstance(chain, DHTable) else robot.link_names[-1]
     frame = robot.tree.frame_name(robot.link_names.index(tip))
     if quantities is None:
         quantities = DEFAULT_QUANTITIES if robot.nv else DEFAULT_QUANTITIES[:1]

@@ -27,6 +27,7 @@ _STATE_SYMBOLS = {
     "acc": r"\ddot{p}",
 }
 _STATE_NAME = re.compile(r"(R|p|w|vel|alpha|acc)(\d+)_(\w+)")
+_EQUATION_NUMBERS = re.compile(r": ([\d., ]+)\Z")
 _FUNCTION_CALL = re.compile(r"\b(sin|cos|sqrt)\(")
 _RESULT_SYMBOLS = {
     "placement": "T",
@@ -67,8 +68,9 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
     writer.names = {node: _symbol(node, name) for node, name in writer.names.items()}
     yield rf"\subsection*{{{function.quantity.title}, eq. {', '.join(function.quantity.equations)}}}"
     for head, lines in writer.statements():
-        step, _, equations = head.partition(": ")
-        yield rf"{latex_text(step)}{f' ({equations})' if equations else ''}:"
+        numbers = _EQUATION_NUMBERS.search(head)
+        step, equations = (head[: numbers.start()], f" ({numbers[1]})") if numbers else (head, "")
+        yield f"{latex_text(step)}{equations}:"
         yield from _align_lines(lines)
     letter = _RESULT_SYMBOLS[function.name]
     yield from _align_lines(

@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, QuestionsSection
+from urdfkin.kinematics.inputs import as_floats
 from urdfkin.model.configuration import parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
@@ -79,7 +82,7 @@ class Coupling:
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
             return self.layout(symbol).parse(by_name)
-        values = np.asarray(array, dtype=np.float64)
+        values = as_floats(cast("ArrayLike", array), symbol)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             names = ", ".join(self.names) or "none"
             raise InputError(

@@ -323,7 +323,7 @@ def verify_function(
         function,
         robot,
         row,
-        frame or robot.tip_frame,
+        robot.tip_frame if frame is None else frame,
         None if not row.has_reference else Reference.of(reference),
         as_int(samples, "samples", 0),
         as_int(seed, "seed", 0),
@@ -594,7 +594,7 @@ class _Run:
                 f" factor={math.ceil(total.bound_ratio * self.factor)} accepts them"
             )
             return
-        mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
+        mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion, self.options)
         first = slice(_DIAGNOSIS_SAMPLES)
         inputs = tuple(x[first_batch.valid_indices[first]] for x in first_batch.inputs)
         case = DiagnosisCase(
