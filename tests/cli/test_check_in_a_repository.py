@@ -676,14 +676,15 @@ def test_standard_input_and_a_robot_of_the_catalogue_are_not_fixed(here: Path) -
     assert check("--fix", "ur5", "--select", "URDF601").code == 0
 
 
-def test_sarif_contains_the_edits_of_fix(here: Path) -> None:
-    put("arm.urdf")
-    (result,) = check("--format", "sarif").data["runs"][0]["results"]
-    (change,) = result["fixes"][0]["artifactChanges"]
+@pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["no mark", "byte order mark"])
+def test_sarif_contains_the_edits_of_fix_and_counts_a_byte_order_mark(here: Path, mark: str) -> None:
+    put("arm.urdf", mark + LONG)
+    results = check("--format", "sarif", "--select", "URDF503").data["runs"][0]["results"]
+    (change,) = results[0]["fixes"][0]["artifactChanges"]
     (edit,) = change["replacements"]
     region: Any = edit["deletedRegion"]
-    cut = LONG[region["byteOffset"] :][: region["byteLength"]]
-    assert (cut, edit["insertedContent"]["text"]) == ("0 0 2", "0 0 1")
+    cut = Path("arm.urdf").read_bytes()[region["byteOffset"] :][: region["byteLength"]]
+    assert (cut, edit["insertedContent"]["text"]) == (b"0 0 2", "0 0 1")
 
 
 # -- the page ------------------------------------------------------------------------------------------

@@ -72,6 +72,7 @@ class CheckOutcome:
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
         files_with_errors: Files with a reported finding of severity error. --fix does not change these files.
             A warning that --strict reports as an error does not count.
+        files_with_mark: Files that begin with a byte order mark.
         unwritable: Names of inputs that --fix cannot change: standard input, a pipe, an expanded .xacro file,
             or a robot of the catalogue.
     """
@@ -88,11 +89,14 @@ class CheckOutcome:
     patches: list[str] = field(default_factory=list)
     unsafe_count: int = 0
     files_with_errors: set[str] = field(default_factory=set)
+    files_with_mark: set[str] = field(default_factory=set)
     unwritable: set[str] = field(default_factory=set)
 
     def add(self, file: str, found: Examination) -> None:
         formatter = ExcerptFormatter(found.data)
         self.files.append(file)
+        if found.text.data.startswith(codecs.BOM_UTF8):
+            self.files_with_mark.add(found.text.label)
         self.findings += found.findings
         self.silenced_findings += found.silenced_findings
         self.excerpts += [formatter.format(finding) for finding in found.findings]
@@ -106,7 +110,7 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced_findings))
     elif style == "sarif":
-        click.echo(as_sarif(findings, version, outcome.silenced_findings))
+        click.echo(as_sarif(findings, version, outcome.silenced_findings, outcome.files_with_mark))
     elif style == "github":
         if findings:
             print_github_commands(as_github(findings))
