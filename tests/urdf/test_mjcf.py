@@ -94,6 +94,16 @@ def test_the_limits_of_a_hinge_determine_its_kind() -> None:
     assert (b.kind.value, b.limit) == ("continuous", None)
 
 
+@pytest.mark.parametrize("more", ["", 'range="-1 2"', 'type="slide"'])
+@pytest.mark.parametrize(("bounds", "effort"), [("-5 10", 10.0), ("-10 5", 10.0), ("-10 -5", 10.0)])
+def test_the_effort_of_any_joint_is_the_largest_absolute_value_of_actuatorfrcrange(
+    bounds: str, effort: float, more: str
+) -> None:
+    robot = loaded(one_joint(f'<joint name="a" {more} actuatorfrcrange="{bounds}"/>'))
+    assert present(robot.tree.joints[0].limit).effort == effort
+    assert robot.verifier.known_refusal is None
+
+
 def of_mujoco(text: str, qpos: FloatArray, body: str) -> FloatArray:
     """Return MuJoCo's placement of a body in the unchanged file."""
     model = mujoco.MjModel.from_xml_string(text)

@@ -513,13 +513,13 @@ class _MjcfReader:
 
     def _make_limit(self, j: int, name: str, *, turns: bool) -> tuple[JointKind, Limit | None]:
         m = self.model
-        effort = float(m.jnt_actfrcrange[j].max()) if m.jnt_actfrclimited[j] else np.inf
+        effort = float(np.abs(m.jnt_actfrcrange[j]).max()) if m.jnt_actfrclimited[j] else np.inf
         if m.jnt_limited[j]:
             lower, upper = map(float, m.jnt_range[j])
             kind = JointKind.REVOLUTE if turns else JointKind.PRISMATIC
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
-            return JointKind.CONTINUOUS, None
+            return JointKind.CONTINUOUS, None if effort == np.inf else Limit(-np.inf, np.inf, np.inf, effort)
         what = (
             f"a slide joint without limits gets +-{FALLBACK_PRISMATIC_LIMIT:g} m,"
             " because URDF requires limits"
