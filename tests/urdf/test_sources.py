@@ -7,7 +7,9 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from tempfile import TemporaryFile
+from threading import Thread
+from types import ModuleType, SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -400,3 +402,49 @@ def test_without_robot_descriptions_the_error_names_the_package_to_install() -> 
 def test_a_file_named_like_a_description_is_loaded(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(write(urdfkin.load("polar", verify=False).urdf, "my_description").parent)
     assert urdfkin.load("my_description").name == "polar"
+
+
+def test_a_stream_that_cannot_be_read_is_an_error_of_urdfkin(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(arm().replace("<robot", "<!-- \xe9 --><robot").encode("latin-1"))
+    closed = io.StringIO(arm())
+    closed.close()
+    for read in (urdfkin.load, urdfkin.check):
+        with pytest.raises(SourceError, match=r"<file>: cannot be read: .*closed file.*; open the file"):
+            read(closed)
+        with path.open() as text, pytest.raises(SourceError, match=r"arm.urdf: .*open the file in binary"):
+            read(text)
+        with (tmp_path / "new").open("w") as new, pytest.raises(SourceError, match="not readable"):
+            read(new)
+        with pytest.raises(InputError, match="must return text or bytes: found NoneType"):
+            read(SimpleNamespace(read=lambda _: None))
+
+
+def test_an_unbuffered_stream_is_read_completely() -> None:
+    text = arm().encode() + b" " * 200_000 + b"<!-- the end -->"
+    reader, writer = os.pipe()
+
+    def write_text() -> None:
+        with os.fdopen(writer, "wb") as other:
+            other.write(text)
+
+    thread = Thread(target=write_text)
+    with os.fdopen(reader, "rb", buffering=0) as stream:
+        thread.start()
+        assert read_source(stream).data == text
+        thread.join()
+
+
+def test_the_source_of_a_stream_is_never_the_name_of_another_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("panda").write_text(arm())
+    with Path("panda").open() as stream:
+        robot = urdfkin.load(stream)
+    assert robot.origin.source == "./panda"
+    assert urdfkin.load(robot.origin.source).name == robot.name
+    with TemporaryFile("w+") as stream:
+        stream.write(arm())
+        stream.seek(0)
+        assert urdfkin.load(stream).origin.source == "<file>"

@@ -6,12 +6,13 @@ for standard input.
 
 from __future__ import annotations
 
+import io
 import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TypeGuard
+from typing import IO, Any, TypeGuard
 
 from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, find_similar_names
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
@@ -172,8 +173,7 @@ def read_source(
     if isinstance(source, str):
         return _read_string(source, max_bytes)
     if hasattr(source, "read"):
-        label = str(getattr(source, "name", "<file>"))
-        return _encode(source.read(max_bytes + 1), label, label)
+        return _read_stream(source, max_bytes)
     raise InputError(
         "the source must be a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
@@ -228,6 +228,28 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
     if os.sep in source or path.suffix or may_exist(path):
         return _read_file(path, max_bytes)
     raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
+
+
+def _read_stream(stream: IO[str] | IO[bytes], max_bytes: int) -> UrdfText:
+    # The name of a temporary file or a pipe is a number.
+    name = getattr(stream, "name", None)
+    label = os.fsdecode(name) if name and isinstance(name, str | bytes) else "<file>"
+    try:
+        content: Any = stream.read(max_bytes + 1)
+        # An unbuffered stream may return only a part of the text.
+        while isinstance(stream, io.RawIOBase) and 0 < len(content) <= max_bytes:
+            if not (more := stream.read(max_bytes + 1 - len(content))):
+                break
+            content += more
+    except (OSError, ValueError) as error:
+        remedy = "open the file for reading, or pass its path"
+        if isinstance(error, UnicodeError):
+            remedy = "open the file in binary mode, or pass its path"
+        raise SourceError("cannot be read", where=label, found=str(error), remedy=remedy) from error
+    if not isinstance(content, str | bytes):
+        found = type(content).__name__
+        raise InputError("read() of an open file must return text or bytes", where=label, found=found)
+    return _encode(content, label, label if label.startswith("<") else unambiguous_path(Path(label)))
 
 
 def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
