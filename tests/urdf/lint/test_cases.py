@@ -3,8 +3,9 @@
 import re
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pinocchio as pin
 import pytest
@@ -15,6 +16,7 @@ import urdfkin
 from tests import urdfs
 from tests.urdf.lint.cases import CASES, left_out
 from tests.urdf.lint.cases.arm import Case, arm
+from urdfkin.errors import InputError
 from urdfkin.urdf.lint import Finding, Severity, SizeLimits, check, check_text
 from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, explain, page
 from urdfkin.urdf.records import FURTHER_LIMITS
@@ -245,6 +247,22 @@ def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: Si
     (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
     assert finding.code == code
     assert "--max-" in str(finding.remedy)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: SizeLimits(bytes="10"),  # type: ignore[arg-type]
+        lambda: SizeLimits(depth=1.5),  # type: ignore[arg-type]
+        lambda: SizeLimits(markup=0),
+        lambda: SizeLimits(name=-1),
+        lambda: {"bytes": 10},
+        lambda: None,
+    ],
+)
+def test_limits_of_a_wrong_type_or_size_are_an_error_of_urdfkin(make: Callable[[], Any]) -> None:
+    with pytest.raises(InputError):
+        check('<robot name="r"><link name="a"/></robot>', limits=make())
 
 
 @pytest.mark.long
