@@ -579,7 +579,14 @@ def test_diff_prints_a_patch_with_the_changes_of_fix(here: Path) -> None:
     assert arm.read_text() == GOOD.replace("    <axis", "\t<axis")
     done = check("--diff")
     assert (done.code, done.out) == (0, b"")
-    assert "--fix does nothing with --diff" in check("--diff", "--fix").err
+
+
+@pytest.mark.parametrize("words", [["--fix"], ["--format", "json"], ["--statistics"], ["--each"]])
+def test_diff_refuses_an_option_that_it_does_not_use(here: Path, words: list[str]) -> None:
+    put("arm.urdf")
+    done = check("--diff", *words)
+    assert (done.code, done.out) == (2, b"")
+    assert f"{words[0]} does nothing with --diff" in done.err
 
 
 ODD_LINES = {

@@ -569,6 +569,15 @@ def test_an_element_of_an_included_file_has_no_line(write: Write) -> None:
     assert lines == {"0": 1, "2": 1, "glue": 14}  # the index of an equality depends on the included file
 
 
+def test_check_uses_the_options_of_loading_for_an_mjcf_file(write: Write) -> None:
+    path = str(write(one_joint('<joint name="root_joint"/>'), "root.xml"))
+    assert command("check", path).code == 0
+    done = command("check", path, "--root-joint", "floating")
+    assert (done.code, "URDF403" in done.text) == (1, True)
+    done = command("check", path, "--xacro-arg", "a:=1")
+    assert (done.code, "only for robots from a .xacro file" in done.err) == (2, True)
+
+
 UNNAMED = f'<body pos="0 0 1">{MASS}{{}}</body><site'
 MESH = '<geom type="mesh" mesh="nope"/></body></worldbody><asset><mesh name="nope" file="nope.stl"/></asset>'
 

@@ -313,8 +313,8 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
     """  # noqa: D301  click needs the character "\b"
-    if options["fix"] and options["diff"]:
-        reject_unused_options(context, ("fix",), "with --diff")
+    if options["diff"]:
+        reject_unused_options(context, ("fix", "style", "statistics", "each"), "with --diff")
     if not (options["fix"] or options["diff"]):
         reject_unused_options(context, ("unsafe_fixes",), "without --fix and --diff")
     if options["write_baseline"] is not None:
@@ -461,11 +461,12 @@ class CheckRun:
         from urdfkin.robot.loading import load
 
         how = load_options()
-        usd = {name: how[name] for name in ("variant", "articulation") if name in how and is_usd(file)}
+        if not is_usd(file):
+            how = {name: value for name, value in how.items() if name not in ("variant", "articulation")}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             try:
-                robot = load(file, verify=False, **usd)
+                robot = load(file, verify=False, **how)
                 found = tuple(finding for finding in robot.findings if finding.code in MJCF_AND_USD_RULES)
             except UrdfError as error:
                 found = error.findings
