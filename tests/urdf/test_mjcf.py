@@ -201,6 +201,22 @@ def test_a_file_that_cannot_be_read_is_an_error_with_the_reason(text: str, what:
         loaded(text)
 
 
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (one_joint('<joint name="a"/>').replace('"1 0 0"', '"inf 0 0"'), "body b"),
+        (one_joint('<joint name="a" ref="nan"/>'), "joint a"),
+        (one_joint('<joint axis="nan 0 1"/>'), "joint 0"),
+        (one_joint('<joint name="a"/>').replace('"0 0 0.5"', '"0 0 nan"'), "site s"),
+    ],
+)
+def test_the_error_about_a_number_that_is_not_finite_names_the_element(text: str, where: str) -> None:
+    with pytest.raises(
+        InputError, match=rf"<text>: {where}: .* is not finite: found (nan|inf); write finite"
+    ):
+        loaded(text)
+
+
 @pytest.mark.parametrize("root", ["robot", "mujoco"])
 def test_the_search_for_the_root_element_takes_linear_time(root: str) -> None:
     began = time.process_time()
