@@ -22,6 +22,7 @@ from lxml import etree
 
 import urdfkin
 from tests.cli.running import python
+from tests.reading import present
 from tests.urdf.lint.cases.arm import arm, axis
 from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as urdf
@@ -273,6 +274,35 @@ def test_a_joint_of_a_pinocchio_model_may_have_any_axis(kind: str) -> None:
     q = [0.5, 0.3]
     np.testing.assert_allclose(made.placement(q, "c"), robot.placement(q, "c"), atol=1e-15)
     assert made.certificate().verified
+
+
+def slider(lower: float, upper: float) -> pin.Model:
+    model = pin.Model()
+    model.name = "slider"
+    ends = (np.array([x]) for x in (1.0, 1.0, lower, upper))
+    model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "j", *ends)
+    return model
+
+
+def test_only_a_missing_limit_of_a_prismatic_joint_of_a_pinocchio_model_is_replaced() -> None:
+    for given, expected in (
+        ((-2000.0, math.inf), (-2000.0, 1000.0)), ((-math.inf, 2000.0), (-1000.0, 2000.0)),
+        ((-math.inf, math.inf), (-1000.0, 1000.0)),
+    ):  # fmt: skip
+        limits = present(loaded(slider(*given)).tree.joints[0].limit)
+        assert (limits.lower, limits.upper) == expected
+
+
+@pytest.mark.parametrize("numbers", [(math.nan, 1.0), (0.0, math.nan)], ids=["lower", "upper"])
+def test_a_limit_of_a_pinocchio_model_or_a_yourdfpy_robot_that_is_nan_is_an_error(
+    numbers: tuple[float, float],
+) -> None:
+    with pytest.raises(UrdfError, match="URDF301"):
+        urdfkin.load(slider(*numbers))
+    written = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'.format(*numbers)
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf(joint("j", "prismatic", "a", "b", more=written)).encode()))
+    with pytest.raises(UrdfError, match="URDF301"):
+        urdfkin.load(robot)
 
 
 def test_a_floating_base_of_a_pinocchio_model_is_a_floating_joint() -> None:
