@@ -22,6 +22,7 @@ from lxml import etree
 
 import urdfkin
 from tests.cli.running import python
+from tests.cli.running import urdfkin as urdfkin_command
 from tests.reading import present
 from tests.urdf.lint.cases.arm import arm, axis
 from tests.urdfs import joint, limit, loaded
@@ -76,6 +77,27 @@ def test_a_package_address_is_a_file_or_an_error(write: Write, monkeypatch: pyte
         read_source("package://nowhere/arm.urdf")
     with pytest.raises(SourceError, match=r"^model://nowhere/arm.urdf: the package 'nowhere' is"):
         read_source("model://nowhere/arm.urdf")
+
+
+@pytest.mark.parametrize("name", ["arm.xml", "arm.usda"])
+def test_a_package_address_may_be_an_mjcf_or_usd_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tool = Path("tool")
+    tool.mkdir()
+    (tool / "package.xml").write_text("<package><name>tool</name></package>")
+    (tool / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="a"><joint/><geom size="1"/></body></worldbody></mujoco>'
+    )
+    (tool / "arm.usda").write_text("#usda 1.0\n")
+    address = f"package://tool/{name}"
+    if name == "arm.xml":
+        assert urdfkin.load(address).origin.source == str(tmp_path / "tool" / name)
+        assert "MJCF102" in urdfkin_command("check", address).text
+    else:
+        with pytest.raises(InputError, match="no joint between bodies"):
+            urdfkin.load(address)
 
 
 def test_no_name_of_the_catalogue_contains_a_dot_or_a_separator() -> None:

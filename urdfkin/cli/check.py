@@ -52,7 +52,7 @@ from urdfkin.urdf.lint.settings import (
     read_baseline,
     read_settings,
 )
-from urdfkin.urdf.sources import USD_SUFFIXES, UrdfText, is_usd, is_xacro, read_source
+from urdfkin.urdf.sources import USD_SUFFIXES, UrdfText, is_usd, is_xacro, read_source, resolve_package_uri
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -426,7 +426,7 @@ class CheckRun:
                     # A file that the user named directly may be a pipe.
                     if file not in (word, f"./{word}"):
                         require_regular_file(Path(file))
-                    self._check(file)
+                    self._check(str(resolve_package_uri(file)))
                 except UrdfkinError as error:
                     self.outcome.errors.append(error)
 

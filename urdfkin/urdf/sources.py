@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, TypeGuard
+from typing import IO, Any, TypeGuard, TypeVar
 
 from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, find_similar_names
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
@@ -116,6 +116,8 @@ class Origin:
         return f"urdfkin.load({', '.join([repr(self.source_argument), *arguments])})"
 
 
+T = TypeVar("T")
+
 #: Types of sources for `load` and `check`.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
@@ -159,8 +161,7 @@ def read_source(
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
-    if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
-        source = _resolve_package_uri(source, *address)
+    source = resolve_package_uri(source)
     if is_xacro(source):
         return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
@@ -252,13 +253,21 @@ def _read_stream(stream: IO[str] | IO[bytes], max_bytes: int) -> UrdfText:
     return _encode(content, label, label if label.startswith("<") else unambiguous_path(Path(label)))
 
 
-def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
+def resolve_package_uri(source: T) -> T | Path:
+    """Return the path of a `package://` or `model://` address; return any other source unchanged.
+
+    Raise SourceError if the package is not found.
+    """
+    address = split_uri(source) if isinstance(source, str) else None
+    if address is None:
+        return source
+    name, path = address
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
             f"the package {name!r} is not found",
-            where=uri,
+            where=str(source),
             remedy="add the folder of the package to ROS_PACKAGE_PATH, or name the file by its path",
             question=QuestionsSection.PACKAGES_AND_MESHES,
         )
