@@ -249,6 +249,24 @@ def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: Si
     assert "--max-" in str(finding.remedy)
 
 
+@pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
+def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) -> None:
+    limit = urdfs.limit()
+    text = urdfs.robot(
+        urdfs.joint("a", kind, "l0", "l1", more=limit),
+        urdfs.joint("b", "continuous", "l1", "l2", more=limit + '<mimic joint="a"/>'),
+    )
+    (finding,) = [one for one in check(text) if one.code == "URDF524"]
+    both = finding.remedy == 'write type="revolute" for both joints'
+    corrected = (
+        text.replace('"continuous"', '"revolute"')
+        if both
+        else text.replace('name="b" type="continuous"', 'name="b" type="revolute"')
+    )
+    assert not [one for one in check(corrected) if one.code == "URDF524"]
+    assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
+
+
 @pytest.mark.parametrize(
     "make",
     [

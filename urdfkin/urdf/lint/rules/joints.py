@@ -412,7 +412,9 @@ class _MimicChecker:
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
             message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
-            self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
+            both = mimicked_joint.kind == "continuous"  # Pinocchio also refuses if only the latter is.
+            remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
+            self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
             remedy = (
