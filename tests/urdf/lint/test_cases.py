@@ -249,6 +249,24 @@ def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: Si
     assert "--max-" in str(finding.remedy)
 
 
+@pytest.mark.parametrize("offset", [0.0, 2.71828, 27.182818])
+def test_limits_with_the_remedy_for_a_mimic_joint_have_no_finding(offset: float) -> None:
+    text = urdfs.robot(
+        urdfs.joint("a", "prismatic", "l0", "l1", more=urdfs.limit(-1.0, 1.0)),
+        urdfs.joint(
+            "b", "prismatic", "l1", "l2",
+            more=urdfs.limit(-0.5, 0.5) + f'<mimic joint="a" multiplier="7e-4" offset="{offset}"/>',
+        ),
+    )  # fmt: skip
+    found = [one for one in check(text) if one.code == "URDF527"]
+    assert len(found) == (offset != 0.0)
+    for finding in found:
+        remedy = str(finding.remedy).removeprefix("write ").removesuffix(", as the mimic rule demands")
+        corrected = text.replace(str(finding.found), remedy)
+        assert corrected != text
+        assert not [one for one in check(corrected) if one.code == "URDF527"]
+
+
 @pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
 def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) -> None:
     limit = urdfs.limit()
