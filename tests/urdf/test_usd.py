@@ -678,6 +678,7 @@ REFUSED = {
         stage(ARM.replace("float physics:lowerLimit", "double physics:lowerLimit", 1)),
         r"physics:lowerLimit: the type of an attribute differs from its schema: found double; write float",
     ),
+    "an up axis in lower case": (stage(ARM, up="y"), "upAxis must be Y or Z: found y"),
     "a sheared body": (stage(SHEARED), r"/arm/upper: .* has shear.*: found the scale 1, 2, 1 of /arm"),
     "a URDF": ("<robot/>", UNREADABLE),
     "a stage without its end": ("#usda 1.0\ndef Xform {", UNREADABLE),

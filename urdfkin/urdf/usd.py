@@ -406,7 +406,9 @@ class _StageReader:
         if not (math.isfinite(self._meters_per_unit) and self._meters_per_unit > 0.0):
             what = "metersPerUnit must be a positive number"
             raise InputError(what, where=self.source, found=f"{self._meters_per_unit:g}")
-        if pxr.UsdGeom.GetStageUpAxis(stage) == "Y":
+        if (up_axis := str(pxr.UsdGeom.GetStageUpAxis(stage))) not in ("Y", "Z"):
+            raise InputError("upAxis must be Y or Z", where=self.source, found=up_axis)
+        if up_axis == "Y":
             self._up = _ROTATION_OF_Y_UP
         self._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
         for error in stage.GetCompositionErrors():
