@@ -581,6 +581,13 @@ def test_diff_prints_a_patch_with_the_changes_of_fix(here: Path) -> None:
     assert (done.code, done.out) == (0, b"")
 
 
+def test_a_baseline_contains_all_findings_so_changed_since_is_refused(here: Path) -> None:
+    put("arm.urdf")
+    done = check("--changed-since", "HEAD", "--write-baseline", "known.json")
+    assert (done.code, Path("known.json").exists()) == (2, False)
+    assert "--changed-since does nothing with --write-baseline" in done.err
+
+
 @pytest.mark.parametrize("words", [["--fix"], ["--format", "json"], ["--statistics"], ["--each"]])
 def test_diff_refuses_an_option_that_it_does_not_use(here: Path, words: list[str]) -> None:
     put("arm.urdf")

@@ -318,7 +318,9 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     if not (options["fix"] or options["diff"]):
         reject_unused_options(context, ("unsafe_fixes",), "without --fix and --diff")
     if options["write_baseline"] is not None:
-        reject_unused_options(context, ("output", "style", "statistics"), "with --write-baseline")
+        reject_unused_options(
+            context, ("output", "style", "statistics", "changed_since"), "with --write-baseline"
+        )
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
         reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
     run = _make_run(context.meta[_SETTINGS_KEY], options)
