@@ -579,7 +579,21 @@ def test_diff_prints_a_patch_with_the_changes_of_fix(here: Path) -> None:
     assert arm.read_text() == GOOD.replace("    <axis", "\t<axis")
     done = check("--diff")
     assert (done.code, done.out) == (0, b"")
-    assert "--fix does nothing with --diff" in check("--diff", "--fix").err
+
+
+def test_a_baseline_contains_all_findings_so_changed_since_is_refused(here: Path) -> None:
+    put("arm.urdf")
+    done = check("--changed-since", "HEAD", "--write-baseline", "known.json")
+    assert (done.code, Path("known.json").exists()) == (2, False)
+    assert "--changed-since does nothing with --write-baseline" in done.err
+
+
+@pytest.mark.parametrize("words", [["--fix"], ["--format", "json"], ["--statistics"], ["--each"]])
+def test_diff_refuses_an_option_that_it_does_not_use(here: Path, words: list[str]) -> None:
+    put("arm.urdf")
+    done = check("--diff", *words)
+    assert (done.code, done.out) == (2, b"")
+    assert f"{words[0]} does nothing with --diff" in done.err
 
 
 ODD_LINES = {
@@ -676,14 +690,15 @@ def test_standard_input_and_a_robot_of_the_catalogue_are_not_fixed(here: Path) -
     assert check("--fix", "ur5", "--select", "URDF601").code == 0
 
 
-def test_sarif_contains_the_edits_of_fix(here: Path) -> None:
-    put("arm.urdf")
-    (result,) = check("--format", "sarif").data["runs"][0]["results"]
-    (change,) = result["fixes"][0]["artifactChanges"]
+@pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["no mark", "byte order mark"])
+def test_sarif_contains_the_edits_of_fix_and_counts_a_byte_order_mark(here: Path, mark: str) -> None:
+    put("arm.urdf", mark + LONG)
+    results = check("--format", "sarif", "--select", "URDF503").data["runs"][0]["results"]
+    (change,) = results[0]["fixes"][0]["artifactChanges"]
     (edit,) = change["replacements"]
     region: Any = edit["deletedRegion"]
-    cut = LONG[region["byteOffset"] :][: region["byteLength"]]
-    assert (cut, edit["insertedContent"]["text"]) == ("0 0 2", "0 0 1")
+    cut = Path("arm.urdf").read_bytes()[region["byteOffset"] :][: region["byteLength"]]
+    assert (cut, edit["insertedContent"]["text"]) == (b"0 0 2", "0 0 1")
 
 
 # -- the page ------------------------------------------------------------------------------------------

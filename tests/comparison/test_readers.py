@@ -94,6 +94,43 @@ def test_an_mjcf_file_is_read_by_mujoco_and_by_no_reader_of_urdf(tmp_path: Path)
     assert {one.library for one in compare_readers(urdfkin.load(str(path)))} <= {"Pinocchio", "MuJoCo"}
 
 
+TWO_HINGES = (
+    '<mujoco><worldbody><body name="a"><joint name="x" axis="0 0 1"/><joint name="y" axis="0 1 0"/>'
+    '<geom size="0.1"/></body></worldbody></mujoco>'
+)
+
+
+@pytest.mark.parametrize("root_joint", [None, "floating"])
+@pytest.mark.parametrize("library", ["pinocchio", "mujoco"])
+def test_the_motion_of_the_first_body_of_an_mjcf_file_is_compared(
+    tmp_path: Path, library: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, other = tmp_path / "robot.xml", tmp_path / "other.xml"
+    path.write_text(TWO_HINGES)
+    other.write_text(TWO_HINGES.replace("0 0 1", "1 0 0"))
+    robot = urdfkin.load(str(path), root_joint=root_joint)
+    (found,) = compare_readers(robot, [library])
+    assert found.agrees, found
+    assert (found.joints, found.same_order, found.missing) == (("x", "y"), True, ("x_link",))
+    monkeypatch.setattr(readers, "_library_input", lambda _: (str(other), "mjcf"))
+    (found,) = compare_readers(robot, [library])
+    assert found.worst > 0.1
+
+
+def test_mujoco_and_urdfkin_use_the_same_names_for_mjcf_elements_without_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text('<mujoco><worldbody><body><joint/><geom size="0.1"/></body></worldbody></mujoco>')
+    (found,) = compare_readers(urdfkin.load(str(path)), ["mujoco"])
+    assert found.agrees, found
+    assert (found.joints, found.missing) == (("joint0",), ())
+
+
+@pytest.mark.parametrize("source", [TWO_HINGES, TWO_HINGES.encode()], ids=["text", "bytes"])
+def test_mjcf_without_a_file_is_an_error(source: str | bytes) -> None:
+    with pytest.raises(urdfkin.InputError, match="other libraries read MJCF only from a file"):
+        compare_readers(urdfkin.load(source))
+
+
 USD = """#usda 1.0
 ( metersPerUnit = 1
   upAxis = "Z" )

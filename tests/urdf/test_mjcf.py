@@ -94,6 +94,16 @@ def test_the_limits_of_a_hinge_determine_its_kind() -> None:
     assert (b.kind.value, b.limit) == ("continuous", None)
 
 
+@pytest.mark.parametrize("more", ["", 'range="-1 2"', 'type="slide"'])
+@pytest.mark.parametrize(("bounds", "effort"), [("-5 10", 10.0), ("-10 5", 10.0), ("-10 -5", 10.0)])
+def test_the_effort_of_any_joint_is_the_largest_absolute_value_of_actuatorfrcrange(
+    bounds: str, effort: float, more: str
+) -> None:
+    robot = loaded(one_joint(f'<joint name="a" {more} actuatorfrcrange="{bounds}"/>'))
+    assert present(robot.tree.joints[0].limit).effort == effort
+    assert robot.verifier.known_refusal is None
+
+
 def of_mujoco(text: str, qpos: FloatArray, body: str) -> FloatArray:
     """Return MuJoCo's placement of a body in the unchanged file."""
     model = mujoco.MjModel.from_xml_string(text)
@@ -188,6 +198,22 @@ def test_load_finds_an_error_of_the_reader(broken: tuple[str, object], patch: py
 )
 def test_a_file_that_cannot_be_read_is_an_error_with_the_reason(text: str, what: str) -> None:
     with pytest.raises(InputError, match=what):
+        loaded(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (one_joint('<joint name="a"/>').replace('"1 0 0"', '"inf 0 0"'), "body b"),
+        (one_joint('<joint name="a" ref="nan"/>'), "joint a"),
+        (one_joint('<joint axis="nan 0 1"/>'), "joint 0"),
+        (one_joint('<joint name="a"/>').replace('"0 0 0.5"', '"0 0 nan"'), "site s"),
+    ],
+)
+def test_the_error_about_a_number_that_is_not_finite_names_the_element(text: str, where: str) -> None:
+    with pytest.raises(
+        InputError, match=rf"<text>: {where}: .* is not finite: found (nan|inf); write finite"
+    ):
         loaded(text)
 
 
@@ -557,6 +583,15 @@ def test_an_element_of_an_included_file_has_no_line(write: Write) -> None:
     done = command("check", "--format", "json", str(path))
     lines = {one["name"]: one["line"] for one in done.data["findings"] if one["element"] == "equality"}
     assert lines == {"0": 1, "2": 1, "glue": 14}  # the index of an equality depends on the included file
+
+
+def test_check_uses_the_options_of_loading_for_an_mjcf_file(write: Write) -> None:
+    path = str(write(one_joint('<joint name="root_joint"/>'), "root.xml"))
+    assert command("check", path).code == 0
+    done = command("check", path, "--root-joint", "floating")
+    assert (done.code, "URDF403" in done.text) == (1, True)
+    done = command("check", path, "--xacro-arg", "a:=1")
+    assert (done.code, "only for robots from a .xacro file" in done.err) == (2, True)
 
 
 UNNAMED = f'<body pos="0 0 1">{MASS}{{}}</body><site'

@@ -7,7 +7,9 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from tempfile import TemporaryFile
+from threading import Thread
+from types import ModuleType, SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -20,6 +22,8 @@ from lxml import etree
 
 import urdfkin
 from tests.cli.running import python
+from tests.cli.running import urdfkin as urdfkin_command
+from tests.reading import present
 from tests.urdf.lint.cases.arm import arm, axis
 from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as urdf
@@ -73,6 +77,27 @@ def test_a_package_address_is_a_file_or_an_error(write: Write, monkeypatch: pyte
         read_source("package://nowhere/arm.urdf")
     with pytest.raises(SourceError, match=r"^model://nowhere/arm.urdf: the package 'nowhere' is"):
         read_source("model://nowhere/arm.urdf")
+
+
+@pytest.mark.parametrize("name", ["arm.xml", "arm.usda"])
+def test_a_package_address_may_be_an_mjcf_or_usd_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tool = Path("tool")
+    tool.mkdir()
+    (tool / "package.xml").write_text("<package><name>tool</name></package>")
+    (tool / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="a"><joint/><geom size="1"/></body></worldbody></mujoco>'
+    )
+    (tool / "arm.usda").write_text("#usda 1.0\n")
+    address = f"package://tool/{name}"
+    if name == "arm.xml":
+        assert urdfkin.load(address).origin.source == str(tmp_path / "tool" / name)
+        assert "MJCF102" in urdfkin_command("check", address).text
+    else:
+        with pytest.raises(InputError, match="no joint between bodies"):
+            urdfkin.load(address)
 
 
 def test_no_name_of_the_catalogue_contains_a_dot_or_a_separator() -> None:
@@ -273,6 +298,35 @@ def test_a_joint_of_a_pinocchio_model_may_have_any_axis(kind: str) -> None:
     assert made.certificate().verified
 
 
+def slider(lower: float, upper: float) -> pin.Model:
+    model = pin.Model()
+    model.name = "slider"
+    ends = (np.array([x]) for x in (1.0, 1.0, lower, upper))
+    model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "j", *ends)
+    return model
+
+
+def test_only_a_missing_limit_of_a_prismatic_joint_of_a_pinocchio_model_is_replaced() -> None:
+    for given, expected in (
+        ((-2000.0, math.inf), (-2000.0, 1000.0)), ((-math.inf, 2000.0), (-1000.0, 2000.0)),
+        ((-math.inf, math.inf), (-1000.0, 1000.0)),
+    ):  # fmt: skip
+        limits = present(loaded(slider(*given)).tree.joints[0].limit)
+        assert (limits.lower, limits.upper) == expected
+
+
+@pytest.mark.parametrize("numbers", [(math.nan, 1.0), (0.0, math.nan)], ids=["lower", "upper"])
+def test_a_limit_of_a_pinocchio_model_or_a_yourdfpy_robot_that_is_nan_is_an_error(
+    numbers: tuple[float, float],
+) -> None:
+    with pytest.raises(UrdfError, match="URDF301"):
+        urdfkin.load(slider(*numbers))
+    written = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'.format(*numbers)
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf(joint("j", "prismatic", "a", "b", more=written)).encode()))
+    with pytest.raises(UrdfError, match="URDF301"):
+        urdfkin.load(robot)
+
+
 def test_a_floating_base_of_a_pinocchio_model_is_a_floating_joint() -> None:
     model = pin.buildModelFromUrdf(file("a1"), pin.JointModelFreeFlyer())
     made = loaded(pin.RobotWrapper(model))
@@ -400,3 +454,49 @@ def test_without_robot_descriptions_the_error_names_the_package_to_install() -> 
 def test_a_file_named_like_a_description_is_loaded(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(write(urdfkin.load("polar", verify=False).urdf, "my_description").parent)
     assert urdfkin.load("my_description").name == "polar"
+
+
+def test_a_stream_that_cannot_be_read_is_an_error_of_urdfkin(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(arm().replace("<robot", "<!-- \xe9 --><robot").encode("latin-1"))
+    closed = io.StringIO(arm())
+    closed.close()
+    for read in (urdfkin.load, urdfkin.check):
+        with pytest.raises(SourceError, match=r"<file>: cannot be read: .*closed file.*; open the file"):
+            read(closed)
+        with path.open() as text, pytest.raises(SourceError, match=r"arm.urdf: .*open the file in binary"):
+            read(text)
+        with (tmp_path / "new").open("w") as new, pytest.raises(SourceError, match="not readable"):
+            read(new)
+        with pytest.raises(InputError, match="must return text or bytes: found NoneType"):
+            read(SimpleNamespace(read=lambda _: None))
+
+
+def test_an_unbuffered_stream_is_read_completely() -> None:
+    text = arm().encode() + b" " * 200_000 + b"<!-- the end -->"
+    reader, writer = os.pipe()
+
+    def write_text() -> None:
+        with os.fdopen(writer, "wb") as other:
+            other.write(text)
+
+    thread = Thread(target=write_text)
+    with os.fdopen(reader, "rb", buffering=0) as stream:
+        thread.start()
+        assert read_source(stream).data == text
+        thread.join()
+
+
+def test_the_source_of_a_stream_is_never_the_name_of_another_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("panda").write_text(arm())
+    with Path("panda").open() as stream:
+        robot = urdfkin.load(stream)
+    assert robot.origin.source == "./panda"
+    assert urdfkin.load(robot.origin.source).name == robot.name
+    with TemporaryFile("w+") as stream:
+        stream.write(arm())
+        stream.seek(0)
+        assert urdfkin.load(stream).origin.source == "<file>"

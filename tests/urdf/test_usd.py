@@ -670,6 +670,15 @@ REFUSED = {
     "a blocked limit": (
         stage(d6("rotY", BLOCKED, ALL)), r"joint /arm/j: .* is None.*limit:rotY:physics:low = None",
     ),
+    "a limit that is not a number": (
+        stage(d6("rotY", BLOCKED.replace("None", "nan"), ALL)),
+        r"joint /arm/j: a joint limit is not a number: found limit:rotY:physics:low = nan",
+    ),
+    "a value of another type than in the schema": (
+        stage(ARM.replace("float physics:lowerLimit", "double physics:lowerLimit", 1)),
+        r"physics:lowerLimit: the type of an attribute differs from its schema: found double; write float",
+    ),
+    "an up axis in lower case": (stage(ARM, up="y"), "upAxis must be Y or Z: found y"),
     "a sheared body": (stage(SHEARED), r"/arm/upper: .* has shear.*: found the scale 1, 2, 1 of /arm"),
     "a URDF": ("<robot/>", UNREADABLE),
     "a stage without its end": ("#usda 1.0\ndef Xform {", UNREADABLE),

@@ -9,7 +9,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as run
-from urdfkin.errors import InputError, SourceError
+from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.urdf import xacro
 from urdfkin.urdf.catalogue import find_package
 from urdfkin.urdf.sources import read_source
@@ -98,6 +98,25 @@ def test_an_endless_expansion_ends_with_an_error(write: Write) -> None:
     path = write(f'<robot name="r" {NAMESPACE}>{endless}</robot>', "r.xacro")
     with pytest.raises(XacroError, match="did not finish"):
         expand(path, {}, timeout=3.0)
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        "$(arg n)",
+        "$(eval n*1)",
+        "$(eval n if 'no' else 0)",
+        "${xacro.arg('n')}",
+        "${xacro.arg( &quot;n&quot; )}",
+        "${xacro.arg('' + 'n')}",
+    ],
+)
+def test_an_argument_that_the_file_uses_in_any_way_is_known(write: Write, use: str) -> None:
+    path = write(f'<robot name="r" {NAMESPACE}><link name="l{use}"/></robot>', "r.xacro")
+    assert urdfkin.load(path, xacro_args={"n": 3}).link_names == ("l3",)
+    if "''" not in use:
+        with pytest.raises(UnknownNameError, match="unknown xacro argument 'no'; did you mean n"):
+            urdfkin.load(path, xacro_args={"n": 3, "no": 1})
 
 
 def test_mistakes_with_xacro_are_errors_with_a_remedy(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,7 +52,7 @@ from urdfkin.urdf.lint.settings import (
     read_baseline,
     read_settings,
 )
-from urdfkin.urdf.sources import USD_SUFFIXES, UrdfText, is_usd, is_xacro, read_source
+from urdfkin.urdf.sources import USD_SUFFIXES, UrdfText, is_usd, is_xacro, read_source, resolve_package_uri
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -71,6 +71,7 @@ class CheckOutcome:
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
         files_with_errors: Files with a reported finding of severity error. --fix does not change these files.
             A warning that --strict reports as an error does not count.
+        files_with_mark: Files that begin with a byte order mark.
         unwritable: Names of inputs that --fix cannot change: standard input, a pipe, an expanded .xacro file,
             or a robot of the catalogue.
     """
@@ -87,11 +88,14 @@ class CheckOutcome:
     patches: list[str] = field(default_factory=list)
     unsafe_count: int = 0
     files_with_errors: set[str] = field(default_factory=set)
+    files_with_mark: set[str] = field(default_factory=set)
     unwritable: set[str] = field(default_factory=set)
 
     def add(self, file: str, found: Examination) -> None:
         formatter = ExcerptFormatter(found.data)
         self.files.append(file)
+        if found.text.data.startswith(codecs.BOM_UTF8):
+            self.files_with_mark.add(found.text.label)
         self.findings += found.findings
         self.silenced_findings += found.silenced_findings
         self.excerpts += [formatter.format(finding) for finding in found.findings]
@@ -105,7 +109,7 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced_findings))
     elif style == "sarif":
-        click.echo(as_sarif(findings, version, outcome.silenced_findings))
+        click.echo(as_sarif(findings, version, outcome.silenced_findings, outcome.files_with_mark))
     elif style == "github":
         if findings:
             print_github_commands(as_github(findings))
@@ -308,12 +312,14 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
     """  # noqa: D301  click needs the character "\b"
-    if options["fix"] and options["diff"]:
-        reject_unused_options(context, ("fix",), "with --diff")
+    if options["diff"]:
+        reject_unused_options(context, ("fix", "style", "statistics", "each"), "with --diff")
     if not (options["fix"] or options["diff"]):
         reject_unused_options(context, ("unsafe_fixes",), "without --fix and --diff")
     if options["write_baseline"] is not None:
-        reject_unused_options(context, ("output", "style", "statistics"), "with --write-baseline")
+        reject_unused_options(
+            context, ("output", "style", "statistics", "changed_since"), "with --write-baseline"
+        )
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
         reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
     run = _make_run(context.meta[_SETTINGS_KEY], options)
@@ -421,7 +427,7 @@ class CheckRun:
                     # A file that the user named directly may be a pipe.
                     if file not in (word, f"./{word}"):
                         require_regular_file(Path(file))
-                    self._check(file)
+                    self._check(str(resolve_package_uri(file)))
                 except UrdfkinError as error:
                     self.outcome.errors.append(error)
 
@@ -456,11 +462,12 @@ class CheckRun:
         from urdfkin.robot.loading import load
 
         how = load_options()
-        usd = {name: how[name] for name in ("variant", "articulation") if name in how and is_usd(file)}
+        if not is_usd(file):
+            how = {name: value for name, value in how.items() if name not in ("variant", "articulation")}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             try:
-                robot = load(file, verify=False, **usd)
+                robot = load(file, verify=False, **how)
                 found = tuple(finding for finding in robot.findings if finding.code in MJCF_AND_USD_RULES)
             except UrdfError as error:
                 found = error.findings

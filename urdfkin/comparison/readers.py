@@ -20,7 +20,7 @@ from urdfkin.errors.escape import escape_unprintable
 from urdfkin.model.tree import FloatArray, Joint, JointKind
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.system.processes import python_command, run_python
-from urdfkin.urdf.mjcf import is_mjcf, is_text
+from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import is_usd
 from urdfkin.verify.adapters import LIBRARIES, version
 
@@ -168,10 +168,7 @@ def _compare_reader(
     poses_of = dict(zip(shared, theirs.swapaxes(0, 1), strict=True))
     elements = _joint_elements(source) if form == "urdf" else {}
     shared_joints = [joint for joint in answer["joints"] if joint in values[0]]
-    joints_without_element = (
-        joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements
-    )
-    added_joint = next(joints_without_element, None)
+    added_joint = None if robot.origin.root_joint is None else robot.tree.joints[0].name
     return LibraryReading(
         title,
         number,
@@ -198,9 +195,9 @@ def _library_input(robot: Robot) -> tuple[str, str]:
             )
         return str(source), "usd"
     if is_mjcf(source):
-        if is_text(source):
-            raise InputError("other libraries read MJCF only from a file", remedy="write the text to a file")
         return str(source), "mjcf"
+    if robot.origin.sha256:  # `robot.urdf` is the URDF that urdfkin made from MJCF text.
+        raise InputError("other libraries read MJCF only from a file", remedy="write the text to a file")
     return _remove_shapes(robot.urdf), "urdf"
 
 

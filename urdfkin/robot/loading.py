@@ -32,6 +32,7 @@ from urdfkin.urdf.sources import (
     is_urdf_path,
     is_usd,
     read_source,
+    resolve_package_uri,
     unambiguous_path,
 )
 from urdfkin.urdf.writer import to_urdf as write_urdf
@@ -137,6 +138,7 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         raise InputError(
             "`variant` must be a mapping from variant sets to variants", found=safe_repr(variant)
         )
+    source = resolve_package_uri(source)
     if is_usd(source):
         return _load_usd(source, xacro_args, variant, articulation, **options)
     if variant or articulation is not None:

@@ -298,7 +298,10 @@ class _ModelReader:
             if kind.turns:
                 kind = JointKind.CONTINUOUS
             else:
-                lower, upper = max(lower, -FALLBACK_PRISMATIC_LIMIT), min(upper, FALLBACK_PRISMATIC_LIMIT)
+                lower, upper = (
+                    x if math.isfinite(x) else math.copysign(FALLBACK_PRISMATIC_LIMIT, x)
+                    for x in (lower, upper)
+                )
         return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
 
 

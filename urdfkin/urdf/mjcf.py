@@ -441,6 +441,7 @@ class _MjcfReader:
 
     def make_tree(self) -> KinematicTree:
         m = self.model
+        self._refuse_infinite_numbers()
         self._links = [
             make_unique(m.body(i).name or f"body{i}", self._used_link_names) for i in range(m.nbody)
         ]
@@ -460,6 +461,20 @@ class _MjcfReader:
         rules = dict(self._read_rules())
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in self._joints]
         return build_tree(self.name, self._links[0], joints)
+
+    def _refuse_infinite_numbers(self) -> None:
+        m = self.model
+        for tag, elements, numbers in (
+            ("body", m.body, (m.body_pos, m.body_quat)),
+            ("joint", m.joint, (m.jnt_pos, m.jnt_axis, m.qpos0[m.jnt_qposadr][:, None])),
+            ("site", m.site, (m.site_pos, m.site_quat)),
+        ):
+            for i, row in enumerate(np.hstack(numbers)):
+                if not np.isfinite(row).all():
+                    where = f"{self.source}: {tag} {elements(i).name or i}"
+                    found = f"{row[~np.isfinite(row)][0]:g}"
+                    message = "a position, orientation or axis is not finite"
+                    raise InputError(message, where=where, found=found, remedy="write finite numbers")
 
     def _add_fixed_joint(self, T: FloatArray, parent: str, child: str) -> None:
         name = make_unique(f"{child}_fixed", self._used_joint_names)
@@ -513,13 +528,13 @@ class _MjcfReader:
 
     def _make_limit(self, j: int, name: str, *, turns: bool) -> tuple[JointKind, Limit | None]:
         m = self.model
-        effort = float(m.jnt_actfrcrange[j].max()) if m.jnt_actfrclimited[j] else np.inf
+        effort = float(np.abs(m.jnt_actfrcrange[j]).max()) if m.jnt_actfrclimited[j] else np.inf
         if m.jnt_limited[j]:
             lower, upper = map(float, m.jnt_range[j])
             kind = JointKind.REVOLUTE if turns else JointKind.PRISMATIC
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
-            return JointKind.CONTINUOUS, None
+            return JointKind.CONTINUOUS, None if effort == np.inf else Limit(-np.inf, np.inf, np.inf, effort)
         what = (
             f"a slide joint without limits gets +-{FALLBACK_PRISMATIC_LIMIT:g} m,"
             " because URDF requires limits"

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+
+from urdfkin.errors.validators import as_int
 
 #: Maximum depth of nested elements in a URDF that Pinocchio reads.
 #: Pinocchio's parser tinyxml2 counts the document as level 1, and refuses level 500.
@@ -35,6 +37,10 @@ class SizeLimits:
     name: int = 10_000
     number: int = 2_000
     markup: int = 10_000_000
+
+    def __post_init__(self) -> None:
+        for limit in fields(self):
+            as_int(getattr(self, limit.name), limit.name, int(limit.name == "markup"))
 
 
 DEFAULT_SIZE_LIMITS = SizeLimits()

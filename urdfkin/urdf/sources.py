@@ -6,12 +6,13 @@ for standard input.
 
 from __future__ import annotations
 
+import io
 import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TypeGuard
+from typing import IO, Any, TypeGuard, TypeVar
 
 from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, find_similar_names
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
@@ -115,6 +116,8 @@ class Origin:
         return f"urdfkin.load({', '.join([repr(self.source_argument), *arguments])})"
 
 
+T = TypeVar("T")
+
 #: Types of sources for `load` and `check`.
 Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
@@ -158,8 +161,7 @@ def read_source(
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
-    if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
-        source = _resolve_package_uri(source, *address)
+    source = resolve_package_uri(source)
     if is_xacro(source):
         return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
@@ -172,8 +174,7 @@ def read_source(
     if isinstance(source, str):
         return _read_string(source, max_bytes)
     if hasattr(source, "read"):
-        label = str(getattr(source, "name", "<file>"))
-        return _encode(source.read(max_bytes + 1), label, label)
+        return _read_stream(source, max_bytes)
     raise InputError(
         "the source must be a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
@@ -230,13 +231,43 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
     raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
 
 
-def _resolve_package_uri(uri: str, name: str, path: str) -> Path:
+def _read_stream(stream: IO[str] | IO[bytes], max_bytes: int) -> UrdfText:
+    # The name of a temporary file or a pipe is a number.
+    name = getattr(stream, "name", None)
+    label = os.fsdecode(name) if name and isinstance(name, str | bytes) else "<file>"
+    try:
+        content: Any = stream.read(max_bytes + 1)
+        # An unbuffered stream may return only a part of the text.
+        while isinstance(stream, io.RawIOBase) and 0 < len(content) <= max_bytes:
+            if not (more := stream.read(max_bytes + 1 - len(content))):
+                break
+            content += more
+    except (OSError, ValueError) as error:
+        remedy = "open the file for reading, or pass its path"
+        if isinstance(error, UnicodeError):
+            remedy = "open the file in binary mode, or pass its path"
+        raise SourceError("cannot be read", where=label, found=str(error), remedy=remedy) from error
+    if not isinstance(content, str | bytes):
+        found = type(content).__name__
+        raise InputError("read() of an open file must return text or bytes", where=label, found=found)
+    return _encode(content, label, label if label.startswith("<") else unambiguous_path(Path(label)))
+
+
+def resolve_package_uri(source: T) -> T | Path:
+    """Return the path of a `package://` or `model://` address; return any other source unchanged.
+
+    Raise SourceError if the package is not found.
+    """
+    address = split_uri(source) if isinstance(source, str) else None
+    if address is None:
+        return source
+    name, path = address
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
             f"the package {name!r} is not found",
-            where=uri,
+            where=str(source),
             remedy="add the folder of the package to ROS_PACKAGE_PATH, or name the file by its path",
             question=QuestionsSection.PACKAGES_AND_MESHES,
         )

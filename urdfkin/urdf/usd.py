@@ -406,7 +406,9 @@ class _StageReader:
         if not (math.isfinite(self._meters_per_unit) and self._meters_per_unit > 0.0):
             what = "metersPerUnit must be a positive number"
             raise InputError(what, where=self.source, found=f"{self._meters_per_unit:g}")
-        if pxr.UsdGeom.GetStageUpAxis(stage) == "Y":
+        if (up_axis := str(pxr.UsdGeom.GetStageUpAxis(stage))) not in ("Y", "Z"):
+            raise InputError("upAxis must be Y or Z", where=self.source, found=up_axis)
+        if up_axis == "Y":
             self._up = _ROTATION_OF_Y_UP
         self._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
         for error in stage.GetCompositionErrors():
@@ -470,11 +472,20 @@ class _StageReader:
         attribute = prim.GetAttribute(name)
         if not attribute:
             return None
+        self._refuse_wrong_type(attribute)
         value = attribute.Get()
         if value is None and attribute.HasFallbackValue():
             value = prim.GetPrimDefinition().GetAttributeFallbackValue(name)
         self._report_timed(attribute, f"urdfkin takes {value}")
         return value
+
+    def _refuse_wrong_type(self, attribute: Any) -> None:
+        """Refuse a value that has not the type of the schema; OpenUSD's parser ignores such a value."""
+        spec = next((one for one in attribute.GetPropertyStack() if one.HasDefaultValue()), None)
+        if spec is not None and spec.typeName.type != attribute.GetTypeName().type:
+            where, remedy = f"{self.source}: {attribute.GetPath()}", f"write {attribute.GetTypeName()}"
+            message = "the type of an attribute differs from its schema"
+            raise InputError(message, where=where, found=str(spec.typeName), remedy=remedy)
 
     def _report_timed(self, attribute: Any, consequence: str) -> None:
         path = str(attribute.GetPath())
@@ -759,7 +770,11 @@ class _StageReader:
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)
-        return float(self._read_value(prim, name))
+        value = float(self._read_value(prim, name))
+        if math.isnan(value):
+            where = f"{self.source}: joint {prim.GetPath()}"
+            raise InputError("a joint limit is not a number", where=where, found=f"{name} = nan")
+        return value
 
     def _make_motion(
         self, path: str, direction: str, limits: Iterator[float]

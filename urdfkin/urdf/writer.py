@@ -73,9 +73,10 @@ def _write_limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
     named = [("effort", limit.effort), ("velocity", limit.velocity)]
     if has_limits:
         named = [("lower", limit.lower), ("upper", limit.upper), *named]
-    finite = [f'{name}="{float(value)!r}"' for name, value in named if math.isfinite(value)]
-    if finite:
-        yield f"    <limit {' '.join(finite)}/>"
+    # A NaN is written, so that `check` reports it.
+    written = [f'{name}="{float(value)!r}"' for name, value in named if not math.isinf(value)]
+    if written:
+        yield f"    <limit {' '.join(written)}/>"
 
 
 def format_numbers(values: Iterable[float]) -> str:

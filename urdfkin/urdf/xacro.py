@@ -16,6 +16,7 @@ import xml.etree.ElementTree as Xml
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.util import find_spec
+from keyword import iskeyword
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,10 @@ MAX_SEARCHED_BYTES, MAX_SEARCHED_FILES = 10_000_000, 200
 FindPackage = Callable[[str], str]
 
 _ARGUMENT_USE = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
+_ARGUMENT_CALL = re.compile(r"""\bxacro\.arg\(\s*(?:(['"])([^'"]*)\1\s*\))?""")
+_EVALUATION = re.compile(r"\$\(eval\s+([^)]*)")
+#: A text in quotation marks, or a name.
+_TEXT_OR_NAME = re.compile(r"""'[^']*'|"[^"]*"|(?<![\w.])([A-Za-z_]\w*)""")
 _PACKAGE_USE = re.compile(r"\$\(find\s+([^\s()]+)\s*\)")
 _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 
@@ -42,8 +47,8 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
     """Return the names of the arguments that a xacro file and its included files declare or use.
 
-    Return None if the names may be incomplete: a file cannot be found or read, a file name is computed, or
-    there are more than `MAX_SEARCHED_FILES` files.
+    Return None if the names may be incomplete: a file cannot be found or read, the name of a file or an
+    argument is computed, or there are more than `MAX_SEARCHED_FILES` files.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
@@ -55,8 +60,8 @@ def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
             if len(seen) > MAX_SEARCHED_FILES:
                 return None
             for element in Xml.fromstring(read_bytes(file, MAX_SEARCHED_BYTES)).iter():
-                for text in (*element.attrib.values(), element.text or ""):
-                    names.update(_ARGUMENT_USE.findall(text))
+                for text in (*element.attrib.values(), element.text or "", element.tail or ""):
+                    names |= _find_used_arguments(text)
                 namespace, _, tag = str(element.tag).rpartition("}")
                 if "xacro" in namespace and tag == "arg":
                     names.add(element.get("name", ""))
@@ -64,6 +69,21 @@ def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
                     files.append(_find_included_file(element.get("filename", ""), file, find))
     except (SourceError, RefusedError, LookupError, ValueError, Xml.ParseError):
         return None
+    return names
+
+
+def _find_used_arguments(text: str) -> set[str]:
+    """Return the names of arguments in a text, and all names in `$(eval ...)`.
+
+    Raise LookupError if the name in a call of `xacro.arg` is computed.
+    """
+    names = set(_ARGUMENT_USE.findall(text))
+    for call in _ARGUMENT_CALL.finditer(text):
+        if call[2] is None:
+            raise LookupError(call[0])
+        names.add(call[2])
+    for evaluation in _EVALUATION.findall(text):
+        names.update(name for name in _TEXT_OR_NAME.findall(evaluation) if name and not iskeyword(name))
     return names
 
 

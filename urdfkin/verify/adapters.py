@@ -113,33 +113,46 @@ def read_pinocchio(source: str) -> LibraryModel:
     import pinocchio as pin
 
     if _is_path(source):
-        model, root = pin.buildModelFromMJCF(source), "universe"
+        model, root, groups = pin.buildModelFromMJCF(source), "world", _find_joints_of_bodies(source)
     else:
-        model, root = pin.buildModelFromXML(source, mimic=True), _find_root(source)
+        model, root, groups = pin.buildModelFromXML(source, mimic=True), _find_root(source), {}
     data = model.createData()
+    slots: dict[str, tuple[int, int]] = {}
+    # In Pinocchio, joint 0 is the world.
+    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
+        # In Pinocchio, several MJCF joints of one body are one joint, with the name of the first joint.
+        group = groups.get(name.removeprefix("Composite_"), []) if name.startswith("Composite_") else []
+        if len(group) == joint.nq > 1:
+            slots |= {part: (joint.idx_q + i, 1) for i, part in enumerate(group)}
+        else:
+            slots[name] = joint.idx_q, joint.nq
 
     def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         q = pin.neutral(model)
         for name, value in values.items():
-            if not model.existJointName(name):
-                continue
-            joint = model.joints[model.getJointId(name)]
-            at = joint.idx_q
+            at, count = slots.get(name, (0, 0))
             # In Pinocchio, a continuous joint has two coordinates.
-            if joint.nq == 2:
+            if count == 2:
                 q[at : at + 2] = math.cos(value), math.sin(value)
-            elif joint.nq == 4 and len(value) == _PLANAR:
+            elif count == 4 and len(value) == _PLANAR:
                 q[at : at + 4] = value[0], value[1], math.cos(value[2]), math.sin(value[2])
-            elif joint.nq:
-                q[at : at + joint.nq] = value
+            elif count:
+                q[at : at + count] = value
         pin.framesForwardKinematics(model, data, q)
         return _make_relative(
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    # In Pinocchio, joint 0 is the world.
-    moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
-    return LibraryModel(moving, compute_poses)
+    return LibraryModel([name for name, (_, count) in slots.items() if count], compute_poses)
+
+
+def _find_joints_of_bodies(path: str) -> dict[str, list[str]]:
+    """Return the joints of each body in an MJCF file, by the name of the body's first joint."""
+    bodies: list[list[str]] = []
+    with contextlib.suppress(ET.ParseError):
+        for body in ET.parse(path).iter("body"):
+            bodies.append([joint.get("name", "") for joint in body.iterfind("joint")])
+    return {joints[0]: joints for joints in bodies if joints}
 
 
 def read_mujoco(source: str) -> LibraryModel:
@@ -161,7 +174,8 @@ def read_mujoco(source: str) -> LibraryModel:
         warnings.simplefilter("ignore")
         model = (mujoco.MjModel.from_xml_path if _is_path(source) else mujoco.MjModel.from_xml_string)(source)
     data = mujoco.MjData(model)
-    names = [model.joint(i).name for i in range(model.njnt)]
+    # Like urdfkin, the adapter names an MJCF body or joint without a name by its number.
+    names = [model.joint(i).name or f"joint{i}" for i in range(model.njnt)]
 
     def compute_poses(values: Mapping[str, JointValue]) -> Poses:
         data.qpos[:] = model.qpos0
@@ -176,7 +190,11 @@ def read_mujoco(source: str) -> LibraryModel:
                 data.qpos[at] = _as_scalar(value)
         mujoco.mj_kinematics(model, data)
         return _make_relative(
-            {model.body(i).name: _make_pose(data.xmat[i], data.xpos[i]) for i in range(model.nbody)}, root
+            {
+                model.body(i).name or f"body{i}": _make_pose(data.xmat[i], data.xpos[i])
+                for i in range(model.nbody)
+            },
+            root,
         )
 
     planar = {

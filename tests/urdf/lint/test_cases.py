@@ -3,8 +3,9 @@
 import re
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pinocchio as pin
 import pytest
@@ -15,6 +16,7 @@ import urdfkin
 from tests import urdfs
 from tests.urdf.lint.cases import CASES, left_out
 from tests.urdf.lint.cases.arm import Case, arm
+from urdfkin.errors import InputError
 from urdfkin.urdf.lint import Finding, Severity, SizeLimits, check, check_text
 from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, explain, page
 from urdfkin.urdf.records import FURTHER_LIMITS
@@ -245,6 +247,58 @@ def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: Si
     (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
     assert finding.code == code
     assert "--max-" in str(finding.remedy)
+
+
+@pytest.mark.parametrize("offset", [0.0, 2.71828, 27.182818])
+def test_limits_with_the_remedy_for_a_mimic_joint_have_no_finding(offset: float) -> None:
+    text = urdfs.robot(
+        urdfs.joint("a", "prismatic", "l0", "l1", more=urdfs.limit(-1.0, 1.0)),
+        urdfs.joint(
+            "b", "prismatic", "l1", "l2",
+            more=urdfs.limit(-0.5, 0.5) + f'<mimic joint="a" multiplier="7e-4" offset="{offset}"/>',
+        ),
+    )  # fmt: skip
+    found = [one for one in check(text) if one.code == "URDF527"]
+    assert len(found) == (offset != 0.0)
+    for finding in found:
+        remedy = str(finding.remedy).removeprefix("write ").removesuffix(", as the mimic rule demands")
+        corrected = text.replace(str(finding.found), remedy)
+        assert corrected != text
+        assert not [one for one in check(corrected) if one.code == "URDF527"]
+
+
+@pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
+def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) -> None:
+    limit = urdfs.limit()
+    text = urdfs.robot(
+        urdfs.joint("a", kind, "l0", "l1", more=limit),
+        urdfs.joint("b", "continuous", "l1", "l2", more=limit + '<mimic joint="a"/>'),
+    )
+    (finding,) = [one for one in check(text) if one.code == "URDF524"]
+    both = finding.remedy == 'write type="revolute" for both joints'
+    corrected = (
+        text.replace('"continuous"', '"revolute"')
+        if both
+        else text.replace('name="b" type="continuous"', 'name="b" type="revolute"')
+    )
+    assert not [one for one in check(corrected) if one.code == "URDF524"]
+    assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: SizeLimits(bytes="10"),  # type: ignore[arg-type]
+        lambda: SizeLimits(depth=1.5),  # type: ignore[arg-type]
+        lambda: SizeLimits(markup=0),
+        lambda: SizeLimits(name=-1),
+        lambda: {"bytes": 10},
+        lambda: None,
+    ],
+)
+def test_limits_of_a_wrong_type_or_size_are_an_error_of_urdfkin(make: Callable[[], Any]) -> None:
+    with pytest.raises(InputError):
+        check('<robot name="r"><link name="a"/></robot>', limits=make())
 
 
 @pytest.mark.long

@@ -6,10 +6,11 @@ SARIF is a format of code-scanning services and editors: OASIS "Static Analysis 
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -22,16 +23,23 @@ SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schem
 
 
 def as_sarif(
-    findings: Sequence[Finding], version: str, silenced_findings: Sequence[tuple[Finding, str]] = ()
+    findings: Sequence[Finding],
+    version: str,
+    silenced_findings: Sequence[tuple[Finding, str]] = (),
+    files_with_mark: Collection[str] = (),
 ) -> str:
     """Return a SARIF document with all rules about URDF files, and a result for each finding.
 
-    Rules about MJCF and USD are included only if a finding has their code.
+    Rules about MJCF and USD are included only if a finding has their code. `files_with_mark` contains the
+    files that begin with a byte order mark. In SARIF, a byte offset of a fix counts this mark.
     """
     codes = {finding.code for finding in findings}
     rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
-    results = [_result(finding, index[finding.code]) for finding in findings]
+    results = []
+    for finding in findings:
+        mark = codecs.BOM_UTF8 if finding.file in files_with_mark else b""
+        results.append(_result(finding, index[finding.code], len(mark)))
     for finding, reason in silenced_findings:
         suppression = {"kind": "inSource", "justification": reason}
         results.append(_result(finding, index[finding.code]) | {"suppressions": [suppression]})
@@ -52,7 +60,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
     }
 
 
-def _result(finding: Finding, rule_index: int) -> dict[str, Any]:
+def _result(finding: Finding, rule_index: int, mark_length: int = 0) -> dict[str, Any]:
     result: dict[str, Any] = {
         "ruleId": finding.code,
         "ruleIndex": rule_index,
@@ -63,14 +71,14 @@ def _result(finding: Finding, rule_index: int) -> dict[str, Any]:
     if finding.pinocchio_reading is not None:
         result["properties"] = {"pinocchio": finding.pinocchio_reading.value}
     if finding.fix is not None:
-        result["fixes"] = [_fix(finding, finding.fix)]
+        result["fixes"] = [_fix(finding, finding.fix, mark_length)]
     return result
 
 
-def _fix(finding: Finding, fix: Fix) -> dict[str, Any]:
+def _fix(finding: Finding, fix: Fix, mark_length: int) -> dict[str, Any]:
     replacements = [
         {
-            "deletedRegion": {"byteOffset": edit.start, "byteLength": edit.end - edit.start},
+            "deletedRegion": {"byteOffset": mark_length + edit.start, "byteLength": edit.end - edit.start},
             "insertedContent": {"text": edit.text},
         }
         for edit in fix.edits

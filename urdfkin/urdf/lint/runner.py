@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from urdfkin.errors.validators import as_bool, as_str
+from urdfkin.errors import InputError
+from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.urdf.findings import Finding, Findings, Reporter
 from urdfkin.urdf.lint.pages import CODE_BY_NAME
 from urdfkin.urdf.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
@@ -83,6 +84,8 @@ def check(
     if root_joint is not None:
         as_str(root_joint, "root_joint")
     as_bool(fold, "fold")
+    if not isinstance(limits, SizeLimits):
+        raise InputError("limits must be SizeLimits(...)", found=safe_repr(limits))
     text = read_source(source, limits.bytes, xacro_args)
     return Findings(examine(text, limits=limits, mimic=mimic, root_joint=root_joint, fold=fold).findings)
 

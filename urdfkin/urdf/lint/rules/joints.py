@@ -412,7 +412,9 @@ class _MimicChecker:
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
             message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
-            self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
+            both = mimicked_joint.kind == "continuous"  # Pinocchio also refuses if only the latter is.
+            remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
+            self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
             remedy = (
@@ -431,10 +433,15 @@ class _MimicChecker:
         if mimicked_joint is None or moving is None or limits is None or joint.kind == "continuous":
             return
         bounds = Limit(*limits, math.inf, math.inf)
-        low, high = restrict_range(rule, bounds, *moving)
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
-        if low <= high and high - low >= least:
+
+        def is_allowed(bounds: Limit) -> bool:
+            low, high = restrict_range(rule, bounds, *moving)
+            return low <= high and high - low >= least
+
+        if is_allowed(bounds):
             return
+        low, high = restrict_range(rule, bounds, *moving)
         # `restrict_range` subtracts a rounding error at both ends, so a range of one value becomes empty.
         # Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
@@ -443,13 +450,17 @@ class _MimicChecker:
             f"the mimic joint leaves its limits: {mimicked_joint.name!r} moves from {format_range(moving)}, "
         )
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
+        for digits in (6, 12, 17):  # With 17 digits, each number is exact.
+            lower, upper = (f"{end:.{digits}g}" for end in ends)
+            if is_allowed(Limit(float(lower), float(upper), math.inf, math.inf)):
+                break
         self.report.add(
             MIMIC_RANGE,
             f"{message}but the limits of the mimic joint allow {allowed}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
-            remedy=f'write lower="{ends[0]:.6g}" upper="{ends[1]:.6g}", as the mimic rule demands',
+            remedy=f'write lower="{lower}" upper="{upper}", as the mimic rule demands',
             severity=None if self.enabled else Severity.NOTE,
         )
 
