@@ -475,6 +475,24 @@ def test_the_cosine_and_sine_of_a_joint_do_not_depend_on_the_unit_of_angles(tmp_
     assert np.allclose(program.from_(q), [0.5], 0, 1e-15)
 
 
+@pytest.mark.parametrize(
+    ("root_joint", "symbol", "name"),
+    [
+        ("floating", "v", "root_joint.wz"),
+        ("planar", "v", "root_joint.wz"),
+        ("planar", "q", "root_joint.angle"),
+    ],
+)
+def test_an_angle_of_a_free_joint_in_degrees_has_no_other_unit(
+    root_joint: Any, symbol: str, name: str
+) -> None:
+    program = urdfkin.load("planar_two_link", root_joint=root_joint, verify=False).convention("usd")
+    layout = program.layout(symbol)
+    assert layout.parse(f"neutral, {name}=90")[layout.names.index(name)] == 90.0
+    with pytest.raises(InputError, match="wrong unit: found '90deg'; use no unit"):
+        layout.parse(f"neutral, {name}=90deg")
+
+
 def test_the_error_of_a_mimic_value_has_the_unit_of_the_convention(tmp_path: Path) -> None:
     arm = arm_with(rule_of_b=mimic("a", 2))
     (tmp_path / "degrees.toml").write_text('angle = "deg"\n')

@@ -125,6 +125,11 @@ class Convention:
     def angle_factor(self) -> float:
         return _UNITS[self.angle]
 
+    @property
+    def angle_unit(self) -> str:
+        """Unit of angles that a text may state, as in "90deg"; "" if a text must state no unit."""
+        return "rad" if self.angle == "rad" else ""
+
 
 @cache
 def _load_built_in() -> dict[str, Convention]:

@@ -270,7 +270,7 @@ class Conversion:
         point = np.zeros(3) if how.point == "origin" else self._centre_of_mass(self.tree.links[i + 1])
         linear = [_TargetNumber(f"{name}.v{x}", v + k, unit="m") for k, x in enumerate("xyz")]
         angular = [
-            _TargetNumber(f"{name}.w{x}", v + 3 + k, how.angle_factor, unit="rad")
+            _TargetNumber(f"{name}.w{x}", v + 3 + k, how.angle_factor, unit=how.angle_unit)
             for k, x in enumerate("xyz")
         ]
         first = len(self._rates)
@@ -286,10 +286,10 @@ class Conversion:
                 _TargetNumber(f"{name}.{part}", q + 2, cos_or_sin=part) for part in ("cos", "sin")
             ]
         else:
-            self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
+            self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit=how.angle_unit))
         first = len(self._rates)
         self._rates += [_TargetNumber(f"{name}.v{x}", v + k, unit="m") for k, x in enumerate("xy")]
-        self._rates.append(_TargetNumber(f"{name}.wz", v + 2, how.angle_factor, unit="rad"))
+        self._rates.append(_TargetNumber(f"{name}.wz", v + 2, how.angle_factor, unit=how.angle_unit))
         if how.planar == "parent":
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
