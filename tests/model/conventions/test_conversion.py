@@ -4,6 +4,7 @@ import inspect
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tests.cli.running import good
 from tests.comparison.pairs import disguised, files_of, loaded
 from tests.comparison.pairs import robot as pair
 from tests.model.conventions.libraries import LIBRARIES
+from tests.model.test_named_coordinates import Columns
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.result import Sameness
@@ -165,6 +167,38 @@ def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
         together = method(*inputs, frames)
         for k, frame in enumerate(frames):
             assert np.array_equal(together[:, k], method(*inputs, frame))
+
+
+def test_each_argument_of_a_robot_in_a_convention_may_lack_batch_axes_of_the_others(dog: Robot) -> None:
+    robot, frames = dog.with_convention("mujoco"), ["FL_foot", "RR_foot"]
+    q, v, _ = robot.conversion.to(*_values(dog, 2))
+    found = robot.jacobian_rate(q[0], v, frames)
+    for k, i in itertools.product(range(2), range(2)):
+        assert np.allclose(found[k, i], robot.jacobian_rate(q[0], v[k], frames[i]), 0, 1e-13)
+    base = urdfkin.BaseMotion(velocity=np.arange(24.0).reshape(2, 2, 6))
+    for found in (robot.jacobian(q, "FL_foot", base=base), robot.jacobian(q[None], "FL_foot", base=base)):
+        assert np.allclose(found, robot.jacobian(q, "FL_foot"), 0, 1e-13)
+    H = robot.hessian(q, "FL_foot")
+    assert np.allclose(robot.hessian(q, "FL_foot", base=base), H, 0, 1e-13)
+
+
+def test_a_robot_in_a_convention_reads_and_refuses_arguments_as_the_robot_does(dog: Robot) -> None:
+    robot = dog.with_convention("mujoco")
+    q, v = robot.sample(3), np.zeros((2, robot.nv))
+    table = Columns(q[:, ::-1], robot.coordinate_names[::-1])
+    for mapping in (table, MappingProxyType(dict(zip(robot.coordinate_names, q.T, strict=True)))):
+        assert np.array_equal(robot.placement(mapping, "FL_foot"), robot.placement(q, "FL_foot"))
+        assert np.array_equal(robot.conversion.from_(mapping), robot.conversion.from_(q))
+    for call in (
+        lambda: robot.velocity(q, v, "FL_foot"),
+        lambda: robot.conversion.from_(q, v),
+        lambda: robot.conversion.to(dog.sample(3), v),
+        lambda: robot.conversion.matrix_rate(dog.sample(3), v),
+    ):
+        with pytest.raises(InputError, match=r"do not broadcast: found \(3,\), \(2,\)"):
+            call()
+    with pytest.raises(InputError, match="v must be real numbers: found None"):
+        robot.velocity(q, None, "FL_foot")  # type: ignore[arg-type]
 
 
 def test_an_output_array_does_not_change_the_result(dog: Robot) -> None:

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +27,7 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.kinematics.inputs import as_finite
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
-from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout
+from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
 from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
@@ -417,11 +417,13 @@ class Conversion:
         return results[0] if len(results) == 1 else tuple(results)
 
     @overload
-    def from_(self, q: ArrayLike) -> FloatArray: ...
+    def from_(self, q: ConfigurationLike) -> FloatArray: ...
     @overload
-    def from_(self, q: ArrayLike, v: ArrayLike, a: ArrayLike | None = None) -> tuple[FloatArray, ...]: ...
     def from_(
-        self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+        self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
+    ) -> tuple[FloatArray, ...]: ...
+    def from_(
+        self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a from the target program's convention.
 
@@ -437,21 +439,28 @@ class Conversion:
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
-        results = [self._from_target_q(self._check_target(q, "q"))]
-        if v is not None:
-            results.append(self._from_target_rates(results[0], self._check_target(v, "v")))
-        if a is not None:
-            results.append(self._from_target_rates(results[0], self._check_target(a, "a"), results[1]))
+        given = zip((q, v, a), "qva", strict=True)
+        inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
+        _check_batch_shapes(inputs)
+        results = [self._from_target_q(inputs[0])]
+        if len(inputs) > 1:
+            results.append(self._from_target_rates(results[0], inputs[1]))
+        if len(inputs) > 2:
+            results.append(self._from_target_rates(results[0], inputs[2], results[1]))
         return results[0] if len(results) == 1 else tuple(results)
 
     def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
         if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", values, strict=True)
-        return [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
+        inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
+        _check_batch_shapes(inputs)
+        return inputs
 
-    def _check_target(self, value: ArrayLike, symbol: str) -> FloatArray:
-        array, width = as_finite(value, symbol), self.nq if symbol == "q" else self.nv
+    def _check_target(self, value: ConfigurationLike, symbol: str) -> FloatArray:
+        named = as_text_or_mapping(value, symbol)
+        numbers = cast("ArrayLike", value) if named is None else self.layout(symbol).parse(named)
+        array, width = as_finite(numbers, symbol), self.nq if symbol == "q" else self.nv
         if array.shape[-1:] != (width,):
             names = self.coordinate_names if symbol == "q" else self.velocity_names
             raise InputError(
@@ -702,8 +711,8 @@ class Conversion:
             return converted
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
-        array = self.reorder_six_vector(J, -2)
-        return converted + array @ _add_frame_axis(change, array.ndim)
+        # J lacks the batch axes that only v has.
+        return converted + self.reorder_six_vector(J, -2) @ _add_frame_axis(change, converted.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
         """Convert urdfkin's kinematic Hessian to the target program's Hessian.
@@ -866,6 +875,15 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
         )
         for at in range(count)
     ]
+
+
+def _check_batch_shapes(inputs: Sequence[FloatArray]) -> None:
+    shapes = [x.shape[:-1] for x in inputs]
+    try:
+        np.broadcast_shapes(*shapes)
+    except ValueError:
+        found = ", ".join(map(str, shapes))
+        raise InputError("the batch shapes of q, v and a do not broadcast", found=found) from None
 
 
 def _multiply(B: FloatArray, x: FloatArray) -> FloatArray:
