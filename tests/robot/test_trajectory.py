@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.urdfs import built, joint
 from urdfkin.errors import InputError, SourceError
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import Trajectory, make_line_trajectory, read_columns, read_trajectory
@@ -191,6 +192,14 @@ def test_a_column_heading_may_end_with_a_unit(heading: str, value: float) -> Non
 def test_a_joint_may_have_the_name_of_a_time_column() -> None:
     found = read_columns("t,time\n1,2\n", "x.csv", "q", ["time"], ["t"], units={"t": "s", "time": "rad"})
     assert {name: x.tolist() for name, x in found.items()} == {"t": [1.0], "time": [2.0]}
+
+
+@pytest.mark.parametrize("name", ["t", "v:b"])
+def test_a_joint_with_the_name_of_another_column_is_refused(name: str, tmp_path: Path) -> None:
+    arm = built(joint(name, "continuous", "l0", "l1"), joint("b", "continuous", "l1", "l2"), verify=False)
+    log = write(tmp_path / "x.csv", {name: np.arange(3.0), "b": np.zeros(3)})
+    with pytest.raises(InputError, match=f"also the name of another column: found {name}; use an .npz file"):
+        read_trajectory(arm, log)
 
 
 @pytest.mark.parametrize(

@@ -357,6 +357,13 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
         names[x] = [f"{prefix}{name}" for name in own]
         units |= {f"{prefix}{name}": unit for name, unit in own.items()}
     optional = ["t", *names["v"], *names["a"]]
+    if ambiguous := [name for name, count in Counter([*names["q"], *optional]).items() if count > 1]:
+        raise InputError(
+            "a joint's name is also the name of another column",
+            where=str(path),
+            found=join_names(ambiguous),
+            remedy="use an .npz file",
+        )
     what = (
         "a trajectory"
         if conversion is None
