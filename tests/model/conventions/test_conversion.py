@@ -296,6 +296,18 @@ def test_an_unknown_convention_or_name_in_its_file_is_refused_with_the_nearest_n
     assert words in str(caught.value)
 
 
+def test_the_order_of_joints_may_have_the_names_in_the_convention() -> None:
+    arm = built(joint("1", "continuous", "l0", "l1"), joint("a-b", "continuous", "l1", "l2"), verify=False)
+    for name, joints in (
+        ("usd", ["tn__ab_h3", "tn__1_"]),
+        ("isaaclab", ["a_b", "a_1"]),
+        ("usd", ["a-b", "1"]),
+    ):
+        conversion = arm.convention(name, joints)
+        assert (conversion.joint_names == tuple(joints)) == ("1" not in joints)
+        assert conversion.to([0.0, 0.0], [1.0, 2.0])[1].argmax() == 0
+
+
 def test_a_convention_without_a_known_joint_order_needs_an_explicit_order(arm: Robot) -> None:
     with pytest.raises(InputError, match="no known order of joints"):
         arm.convention("idyntree")

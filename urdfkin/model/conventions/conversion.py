@@ -126,7 +126,7 @@ class Conversion:
                 remedy="pass the joint names in the order of this tool: joints=[...], or `joints` in a"
                 " TOML file",
             )
-        own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
+        own = {self._tool_name(one): one.name for one in self.tree.joints if one.original.kind.nv}
         all_names = [(name, self._find_joint_index(own.get(name, name))) for name in how.joints]
         named = [(name, i) for name, i in all_names if self.tree.joints[i].lock is None]
         order = [i for _, i in named]
@@ -205,8 +205,7 @@ class Conversion:
 
     def _add_joint(self, i: int) -> str:
         how, joint = self.convention, self.tree.joints[i]
-        rule = how.rules.get(joint.name, JointRule())
-        name = rule.name or spell_name(joint.name, how.names)
+        rule, name = how.rules.get(joint.name, JointRule()), self._tool_name(joint)
         q, v = self.tree.q_index[i], self.tree.v_index[i]
         if joint.kind is JointKind.FLOATING:
             self._refuse_rule(joint)
@@ -219,6 +218,10 @@ class Conversion:
         else:
             raise NotImplementedError(f"a {joint.kind} joint in another convention")
         return name
+
+    def _tool_name(self, joint: Joint) -> str:
+        rule = self.convention.rules.get(joint.name)
+        return rule.name if rule and rule.name else spell_name(joint.name, self.convention.names)
 
     def _refuse_rule(self, joint: Joint) -> None:
         rule = self.convention.rules.get(joint.name)
