@@ -51,7 +51,9 @@ def test_a_base_in_the_archive_is_used_and_missing_derivatives_are_computed(
     words = ["imu ur5 --frame tool0 --format json --trajectory", str(path)]
     q, v, a = (motion[x] for x in "qva")
     expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
-    assert urdfkin(*words).data["result"] == expected.tolist()
+    document = urdfkin(*words).data
+    assert document["result"] == expected.tolist()
+    assert {name: document[name] for name in fields} == {name: x.tolist() for name, x in fields.items()}
     np.savez(path, q=motion["q"])
     assert "rates by central differences" in good(*words).err
 
