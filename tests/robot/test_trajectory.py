@@ -8,7 +8,7 @@ import pytest
 
 import urdfkin
 from tests.urdfs import built, joint
-from urdfkin.errors import InputError, SourceError
+from urdfkin.errors import InputError, RangeError, SourceError
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import Trajectory, make_line_trajectory, read_columns, read_trajectory
 
@@ -47,6 +47,20 @@ def test_a_line_without_a_positive_duration_or_enough_samples_is_refused(
 ) -> None:
     with pytest.raises(InputError, match="duration"):
         make_line_trajectory(robot, robot.neutral(), END, duration, samples)
+
+
+def test_a_line_between_batches_of_configurations_is_refused(robot: Robot) -> None:
+    with pytest.raises(InputError, match=r"one start and one end: found shapes \(3, 6\), \(6,\)"):
+        make_line_trajectory(robot, robot.sample(3), END, 1.0, 3)
+
+
+@pytest.mark.parametrize("duration", [1e-150, 1e300])
+def test_a_line_has_finite_velocities_or_is_refused(robot: Robot, duration: float) -> None:
+    x = make_line_trajectory(robot, robot.neutral(), END, duration, 5)
+    assert np.isfinite(x.v).all()
+    assert np.isfinite(x.a).all()
+    with pytest.raises(RangeError, match="the duration is too short: found 1e-160 s"):
+        make_line_trajectory(robot, robot.neutral(), END, 1e-160, 5)
 
 
 @pytest.mark.parametrize("root", ["floating", "planar"])

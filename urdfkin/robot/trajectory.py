@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors import InputError, QuestionsSection, SourceError
+from urdfkin.errors import InputError, QuestionsSection, RangeError, SourceError
 from urdfkin.errors.numbers import (
     UNIT_SHORT_NAMES,
     number_remedy,
@@ -202,8 +202,9 @@ def make_line_trajectory(
     in seconds. `samples` is the number of samples, including the first and the last sample.
 
     Raises:
-        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length;
-            or a number is not finite.
+        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length or
+            is a batch; or a number is not finite.
+        RangeError: the duration is so short that an acceleration is not a finite double.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)
@@ -213,11 +214,16 @@ def make_line_trajectory(
             found=f"{duration} s, {samples}",
         )
     q_0, q_1 = parse_finite(robot.tree, start, "q"), parse_finite(robot.tree, end, "q")
+    if q_0.ndim != 1 or q_1.ndim != 1:
+        raise InputError("a line needs one start and one end", found=f"shapes {q_0.shape}, {q_1.shape}")
     t = np.linspace(0.0, duration, samples)
     u = (t / duration)[:, np.newaxis]
     s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
-    s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
-    s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
+    with np.errstate(over="ignore"):
+        s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+        s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration / duration
+    if not np.isfinite(s_2).all():
+        raise RangeError("the duration is too short", found=f"{duration} s")
     step = difference(robot.tree, q_0, q_1)
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
