@@ -296,6 +296,15 @@ def test_an_unknown_convention_or_name_in_its_file_is_refused_with_the_nearest_n
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("xyz", ["", "1 2", "1,2,3", "nan 0 0"])
+def test_an_invalid_centre_of_mass_is_an_error_that_names_the_link(xyz: str) -> None:
+    inertial = f'<inertial><origin xyz="{xyz}"/><mass value="1"/></inertial>'
+    box = f'<robot name="box"><link name="body">{inertial}</link></robot>'
+    robot = urdfs.loaded(box, root_joint="floating", verify=False)
+    with pytest.raises(InputError, match="link body: the origin of <inertial> must be three finite numbers"):
+        robot.convention("newton")
+
+
 def test_the_order_of_joints_may_have_the_names_in_the_convention() -> None:
     arm = built(joint("1", "continuous", "l0", "l1"), joint("a-b", "continuous", "l1", "l2"), verify=False)
     for name, joints in (

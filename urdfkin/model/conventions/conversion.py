@@ -24,6 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
+from urdfkin.errors.numbers import parse_float
+from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import as_finite
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
@@ -300,7 +302,12 @@ class Conversion:
         """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none."""
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
-                return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
+                text = origin.get("xyz", "0 0 0")
+                point = [parse_float(word) for word in text.split()]
+                if len(point) != 3 or None in point:
+                    claim = "the origin of <inertial> must be three finite numbers"
+                    raise InputError(claim, where=f"link {link}", found=safe_repr(text))
+                return np.array(point, dtype=np.float64)
         return np.zeros(3)
 
     def _precompute(self) -> None:
