@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors import InputError, QuestionsSection, RangeError, SourceError
+from urdfkin.errors import InputError, QuestionsSection, RangeError, SourceError, UrdfkinError
 from urdfkin.errors.numbers import (
     UNIT_SHORT_NAMES,
     number_remedy,
@@ -67,15 +67,18 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
     Pickled objects are rejected, because unpickling can execute code from the file.
     """
     try:
-        with np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise ValueError("a single array")
+        archive = np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise ValueError("a single array")
+        with archive:
             _check_names(path, archive.files, shapes, required)
             entries = archive.zip.infolist() if archive.zip else []
             size = sum(entry.file_size for entry in entries)
             if size > MAX_DATA_BYTES:
                 raise ValueError(f"arrays of {size} bytes, more than {MAX_DATA_BYTES}")
             given = {name: archive[name] for name in archive.files}
+    except UrdfkinError:  # An InputError is a ValueError.
+        raise
     except (
         ValueError,
         EOFError,
