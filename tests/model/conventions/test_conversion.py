@@ -298,6 +298,17 @@ def test_an_unknown_convention_or_name_in_its_file_is_refused_with_the_nearest_n
     assert words in str(caught.value)
 
 
+def test_a_quaternion_in_a_convention_has_norm_1_or_the_error_names_the_joint(dog: Robot) -> None:
+    mujoco = dog.convention("mujoco")
+    q, v, _ = mujoco.to(*_values(dog))
+    q[:, 3:7] *= 1.0 + 1e-9
+    assert np.allclose(np.linalg.norm(mujoco.from_(q)[:, 3:7], axis=1), 1.0, 0, 1e-15)
+    q[1, 3:7] *= 2.0
+    for arguments in ((q,), (q, v)):
+        with pytest.raises(InputError, match="of joint root_joint must be a unit quaternion: found norm 2"):
+            mujoco.from_(*arguments)
+
+
 @pytest.mark.parametrize("xyz", ["", "1 2", "1,2,3", "nan 0 0"])
 def test_an_invalid_centre_of_mass_is_an_error_that_names_the_link(xyz: str) -> None:
     inertial = f'<inertial><origin xyz="{xyz}"/><mass value="1"/></inertial>'

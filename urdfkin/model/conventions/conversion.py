@@ -440,7 +440,7 @@ class Conversion:
         Raises:
             InputError: A length is wrong, or a number is not finite.
                 A mimic joint's value contradicts its rule.
-                The norm of a (cos, sin) pair is not 1 within 1e-6.
+                The norm of a (cos, sin) pair or of a quaternion is not 1 within 1e-6.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -452,7 +452,7 @@ class Conversion:
         given = zip((q, v, a), "qva", strict=True)
         inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
         _check_batch_shapes(inputs)
-        results = [self._from_target_q(inputs[0])]
+        results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
         if len(inputs) > 1:
             results.append(self._from_target_rates(results[0], inputs[1]))
         if len(inputs) > 2:
