@@ -602,3 +602,16 @@ def test_the_convention_of_mujoco_has_the_qpos_and_qvel_of_the_file() -> None:
             data.body(name).xpos, robot.placement(q, f"link:{name}")[:3, 3], atol=1e-14
         )
         np.testing.assert_allclose(np.roll(velocity, 3), robot.velocity(q, v, f"link:{name}"), atol=1e-12)
+
+
+def test_a_velocity_of_an_unknown_centre_of_mass_is_refused() -> None:
+    robot = loaded(SIBLINGS)
+    conversion, q, v = robot.convention("newton"), robot.sample(1)[0], np.ones(10)
+    assert conversion.to(q).shape == (11,)
+    for call in (
+        lambda: conversion.to(q, v),
+        lambda: conversion.from_(q, v),
+        lambda: conversion.jacobian(q, robot.jacobian(q, "foot")),
+    ):
+        with pytest.raises(InputError, match="newton: joint root: velocities of a centre of mass need"):
+            call()

@@ -63,7 +63,8 @@ class _FreeJoint:
     q_index: int  #: First index in urdfkin's q.
     v_index: int  #: First index in urdfkin's v.
     target_slice: slice  #: Indices in the target program's v.
-    velocity_point: FloatArray  #: (3,) the link's origin or centre of mass, in the link's frame (m).
+    #: (3,) the link's origin or centre of mass, in the link's frame (m); None: unknown.
+    velocity_point: FloatArray | None
 
 
 class Conversion:
@@ -75,6 +76,7 @@ class Conversion:
         convention: The convention.
         joints: Order of the joints, which replaces the convention's order. `joints` is required if the
             convention has no order.
+        has_masses: False if `urdf` is converted from a source whose masses urdfkin does not read.
 
     Raises:
         InputError: The order is wrong, two joints get the same name, or a rule does not fit its joint.
@@ -90,12 +92,18 @@ class Conversion:
     """
 
     def __init__(
-        self, tree: KinematicTree, urdf: str, convention: Convention, joints: Sequence[str] | None = None
+        self,
+        tree: KinematicTree,
+        urdf: str,
+        convention: Convention,
+        joints: Sequence[str] | None = None,
+        *,
+        has_masses: bool = True,
     ) -> None:
         if joints is not None:
             convention = replace(convention, order="given", joints=tuple(joints))
         self.tree, self.convention = tree, convention
-        self._urdf = urdf
+        self._urdf, self._has_masses = urdf, has_masses
         for name in convention.rules:
             self._find_joint_index(name)
         self._order = self._find_order()
@@ -280,7 +288,7 @@ class Conversion:
         ]
         first = len(self._rates)
         self._rates += linear + angular if how.base_v == "linear first" else angular + linear
-        if "parent" in (how.linear, how.angular) or point.any():
+        if "parent" in (how.linear, how.angular) or point is None or point.any():
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 6), point))
 
     def _add_planar(self, i: int, name: str, q: int, v: int) -> None:
@@ -298,8 +306,13 @@ class Conversion:
         if how.planar == "parent":
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
-    def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none."""
+    def _centre_of_mass(self, link: str) -> FloatArray | None:
+        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none.
+
+        None: The source's masses are unknown.
+        """
+        if not self._has_masses:
+            return None
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 text = origin.get("xyz", "0 0 0")
@@ -645,6 +658,12 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
+        if block.velocity_point is None:
+            raise InputError(
+                "velocities of a centre of mass need the masses, which urdfkin reads only from a URDF file",
+                where=f"{how.name}: joint {block.joint.name}",
+                remedy='load a URDF file, or write a convention file with point = "origin"',
+            )
         R, own_axes = rotation_from_quaternion(q[..., block.q_index + 3 : block.q_index + 7]), np.eye(3)
         if v is not None:
             R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
