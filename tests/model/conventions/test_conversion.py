@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -296,6 +297,26 @@ def test_an_unknown_convention_or_name_in_its_file_is_refused_with_the_nearest_n
     with pytest.raises(UnknownNameError) as caught:
         arm.convention(file if text else "mujocco")
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["drake", "usd"])
+def test_a_matrix_with_a_wrong_number_of_columns_is_refused(name: str, arm: Robot) -> None:
+    conversion, q, J, H = arm.convention(name), [0.0, 0.0], np.zeros((6, 2)), np.zeros((6, 2, 3))
+    calls: tuple[Callable[[], FloatArray], ...] = (
+        lambda: conversion.jacobian(q, np.zeros((6, 3))),
+        lambda: conversion.columns(q, np.zeros(2)),
+        lambda: conversion.from_jacobian(q, np.zeros((6, 1))),
+        lambda: conversion.hessian(q, J, H),
+    )
+    for call in calls:
+        with pytest.raises(InputError, match=r"[JH] must have the shape \(..., rows, 2(, 2)?\): found \("):
+            call()
+
+
+@pytest.mark.parametrize("joints", ["joint_1", 3, ["joint_1", 2], ["joint_1", None]])
+def test_an_order_that_is_no_list_of_names_is_refused(joints: Any, arm: Robot) -> None:
+    with pytest.raises(InputError, match=r"joints must be a (list of names|name)"):
+        arm.convention("mujoco", joints)
 
 
 def test_a_quaternion_in_a_convention_has_norm_1_or_the_error_names_the_joint(dog: Robot) -> None:

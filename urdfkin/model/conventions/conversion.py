@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.inputs import as_finite, as_floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
@@ -696,7 +696,7 @@ class Conversion:
 
     def jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert a Jacobian J (..., 6, nv) to S J M^-1."""
-        return self.columns(q, self.reorder_six_vector(J, -2))
+        return self.columns(q, self.reorder_six_vector(_as_matrices(J, "J", self.tree.nv), -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert the columns of a matrix J to the target program, as J M^-1.
@@ -711,7 +711,7 @@ class Conversion:
             InputError: The target program has additional columns for mimic joints.
         """
         self._refuse_mimic_columns()
-        array = np.asarray(J, dtype=np.float64)
+        array = _as_matrices(J, "J", self.tree.nv)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_index]
         return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
@@ -725,7 +725,7 @@ class Conversion:
             q: Configuration.
             J: (..., 6, program's nv) Jacobian.
         """
-        array = self.reorder_six_vector(J, -2)
+        array = self.reorder_six_vector(_as_matrices(J, "J", self.nv), -2)
         return array @ _add_frame_axis(self.matrix(q), array.ndim)
 
     def jacobian_rate(
@@ -754,8 +754,8 @@ class Conversion:
         self._refuse_mimic_columns()
         inverse, tensor, columns = (
             self.inverse_matrix(q),
-            self.reorder_six_vector(H, -3),
-            self.reorder_six_vector(J, -2),
+            self.reorder_six_vector(_as_matrices(H, "H", self.tree.nv, self.tree.nv), -3),
+            self.reorder_six_vector(_as_matrices(J, "J", self.tree.nv), -2),
         )
         W = _add_frame_axis(inverse, columns.ndim)
         converted: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
@@ -913,6 +913,14 @@ def _check_batch_shapes(inputs: Sequence[FloatArray]) -> None:
     except ValueError:
         found = ", ".join(map(str, shapes))
         raise InputError("the batch shapes of q, v and a do not broadcast", found=found) from None
+
+
+def _as_matrices(value: ArrayLike, name: str, *columns: int) -> FloatArray:
+    array, n = as_floats(value, name), len(columns)
+    if array.ndim <= n or array.shape[-n:] != columns:
+        shape = ", ".join(map(str, ("...", "rows", *columns)))
+        raise InputError(f"{name} must have the shape ({shape})", found=str(array.shape))
+    return array
 
 
 def _multiply(B: FloatArray, x: FloatArray) -> FloatArray:
