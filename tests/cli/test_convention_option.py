@@ -10,6 +10,8 @@ import pytest
 import urdfkin
 from tests.cli.running import good, numbers, python, refused
 from tests.cli.running import urdfkin as run
+from tests.urdfs import joint
+from tests.urdfs import robot as urdf_of
 from urdfkin.model.conventions import BUILT_IN_NAMES
 from urdfkin.verify.quantities import quantities_by_command
 
@@ -155,3 +157,25 @@ def test_the_printed_code_converts_q_and_v_between_conventions(start: str, end: 
     for name, expected in zip(("q_to", "v_to"), robot.convention(end).to(q, v), strict=True):
         assert np.allclose(space[name], expected, 0, 1e-14)
     assert ("six_to" in text) == ((start == "drake") != (end == "drake"))
+
+
+def test_the_printed_code_names_the_file_of_a_convention(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text('like = "mujoco"\nname = "isaaclab"\n')
+    text = run("order a1 --root-joint floating --to drake --from", str(file)).text
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    q, v = robot.sample(1)[0], np.arange(18.0)
+    space: dict[str, Any] = {"robot": robot, "six_from": np.arange(6)}
+    space["q_from"], space["v_from"] = robot.convention("mujoco").to(q, v)
+    exec(text, space)
+    assert np.allclose(space["v_to"], robot.convention("drake").to(q, v)[1], 0, 1e-13)
+
+
+def test_a_convention_in_which_two_joints_have_the_same_name_is_left_out_with_a_warning(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "r.urdf"
+    file.write_text(urdf_of(joint("a-b", "continuous", "l0", "l1"), joint("a_b", "continuous", "l1", "l2")))
+    done = run("order", str(file), "--format", "json")
+    assert list(done.data["conventions"]) == [name for name in TOOLS if name != "isaaclab"]
+    assert "no column for isaaclab: two joints have the same name in the convention: found 'a_b'" in done.err

@@ -40,6 +40,10 @@ MISTAKES = {
     "jacobian panda --q @/dev/null": "no samples; write one line for each",
     "jacobian panda --q random:many": "N in random:N must be a whole number",
     "jacobian panda --q random:0": "N in random:N must be a whole number, at least 1",
+    f"jacobian panda --q random:{10**13}": "--q: N random samples do not fit into memory",
+    f"velocity panda --v random:{10**23}": "--v: N random samples do not fit into memory",
+    f"plot ur5 --to random --samples {10**13} -o a.svg": "is not in the range 3<=x<=10000000",
+    "plot ur5 --to random --duration 1e-200 -o a.svg": "the duration is too short",
     f"jacobian ur5 --root-joint floating --q {','.join('0' * 13)}": (
         "the quaternion of joint root_joint must be a unit quaternion: found norm 0"
     ),

@@ -149,6 +149,9 @@ def test_several_coordinates_of_a_joint_are_given_by_name_or_together() -> None:
     np.testing.assert_array_equal(robot.placement(together, "e"), expected)
     with pytest.raises(InputError, match=r"root_joint: 7 numbers are expected \(root_joint.x, .*found 3"):
         robot.placement({**together, "root_joint": place[:3]}, "e")
+    for mapping in ({**together, "root_joint.x": 0.5}, {"root_joint.x": 0.5, **together}):
+        with pytest.raises(InputError, match=r"a number is given twice: found root_joint\.x"):
+            robot.placement(mapping, "e")
 
 
 def test_the_error_for_a_q_of_pinocchios_length_names_the_conversion() -> None:

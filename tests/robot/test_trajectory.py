@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.errors import InputError, SourceError
+from tests.urdfs import built, joint
+from urdfkin.errors import InputError, RangeError, SourceError
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import Trajectory, make_line_trajectory, read_columns, read_trajectory
 
@@ -46,6 +47,20 @@ def test_a_line_without_a_positive_duration_or_enough_samples_is_refused(
 ) -> None:
     with pytest.raises(InputError, match="duration"):
         make_line_trajectory(robot, robot.neutral(), END, duration, samples)
+
+
+def test_a_line_between_batches_of_configurations_is_refused(robot: Robot) -> None:
+    with pytest.raises(InputError, match=r"one start and one end: found shapes \(3, 6\), \(6,\)"):
+        make_line_trajectory(robot, robot.sample(3), END, 1.0, 3)
+
+
+@pytest.mark.parametrize("duration", [1e-150, 1e300])
+def test_a_line_has_finite_velocities_or_is_refused(robot: Robot, duration: float) -> None:
+    x = make_line_trajectory(robot, robot.neutral(), END, duration, 5)
+    assert np.isfinite(x.v).all()
+    assert np.isfinite(x.a).all()
+    with pytest.raises(RangeError, match="the duration is too short: found 1e-160 s"):
+        make_line_trajectory(robot, robot.neutral(), END, 1e-160, 5)
 
 
 @pytest.mark.parametrize("root", ["floating", "planar"])
@@ -191,6 +206,14 @@ def test_a_column_heading_may_end_with_a_unit(heading: str, value: float) -> Non
 def test_a_joint_may_have_the_name_of_a_time_column() -> None:
     found = read_columns("t,time\n1,2\n", "x.csv", "q", ["time"], ["t"], units={"t": "s", "time": "rad"})
     assert {name: x.tolist() for name, x in found.items()} == {"t": [1.0], "time": [2.0]}
+
+
+@pytest.mark.parametrize("name", ["t", "v:b"])
+def test_a_joint_with_the_name_of_another_column_is_refused(name: str, tmp_path: Path) -> None:
+    arm = built(joint(name, "continuous", "l0", "l1"), joint("b", "continuous", "l1", "l2"), verify=False)
+    log = write(tmp_path / "x.csv", {name: np.arange(3.0), "b": np.zeros(3)})
+    with pytest.raises(InputError, match=f"also the name of another column: found {name}; use an .npz file"):
+        read_trajectory(arm, log)
 
 
 @pytest.mark.parametrize(

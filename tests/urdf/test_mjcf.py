@@ -612,3 +612,41 @@ def test_the_survey_of_mjcf_files_counts_each_result_of_the_checks(
 ) -> None:
     path = write(one_joint('<joint name="a" axis="0 0 1"/>').replace(old, new), "one.xml")
     assert describe_result(path) == f"verified{shapes}; Pinocchio's MJCF reader: {expected}"
+
+
+SIBLINGS = """<mujoco><worldbody><body name="base"><freejoint name="root"/><geom size=".1"/>
+<body name="z" pos="0 .1 0"><joint name="z1" axis="0 1 0"/><geom size=".1"/>
+  <body name="foot" pos="0 0 -.2"><joint name="b" type="slide" axis="0 0 1"/><geom size=".1"/></body></body>
+<body name="a" pos="0 -.1 0"><joint name="n" axis="0 1 0"/><joint name="m" axis="1 0 0"/>
+  <geom size=".1"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_the_convention_of_mujoco_has_the_qpos_and_qvel_of_the_file() -> None:
+    robot, model = loaded(SIBLINGS), mujoco.MjModel.from_xml_string(SIBLINGS)
+    conversion = robot.convention("mujoco")
+    assert conversion.joint_names == tuple(model.joint(i).name for i in range(model.njnt))
+    assert conversion.joint_names == ("root", "z1", "b", "n", "m")
+    data, q, v = mujoco.MjData(model), robot.sample(1)[0], np.arange(1.0, 11.0)
+    data.qpos[:], data.qvel[:] = conversion.to(q, v)
+    mujoco.mj_forward(model, data)
+    for name in ("foot", "a"):
+        velocity = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, model.body(name).id, velocity, 0)
+        np.testing.assert_allclose(
+            data.body(name).xpos, robot.placement(q, f"link:{name}")[:3, 3], atol=1e-14
+        )
+        np.testing.assert_allclose(np.roll(velocity, 3), robot.velocity(q, v, f"link:{name}"), atol=1e-12)
+
+
+def test_a_velocity_of_an_unknown_centre_of_mass_is_refused() -> None:
+    robot = loaded(SIBLINGS)
+    conversion, q, v = robot.convention("newton"), robot.sample(1)[0], np.ones(10)
+    assert conversion.to(q).shape == (11,)
+    for call in (
+        lambda: conversion.to(q, v),
+        lambda: conversion.from_(q, v),
+        lambda: conversion.jacobian(q, robot.jacobian(q, "foot")),
+    ):
+        with pytest.raises(InputError, match="newton: joint root: velocities of a centre of mass need"):
+            call()

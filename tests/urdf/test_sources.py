@@ -165,6 +165,14 @@ def test_an_object_of_another_library_is_the_robot_of_its_file(holder: str, name
     assert other.certificate().verified
 
 
+@pytest.mark.parametrize("holder", HOLDERS)
+def test_an_object_of_another_library_has_the_joint_order_of_its_file(holder: str, tmp_path: Path) -> None:
+    path = tmp_path / "r.urdf"
+    path.write_text(urdf(joint("b", "continuous", "l0", "l1"), joint("a", "continuous", "l0", "l2")))
+    robot = loaded(HOLDERS[holder](str(path)))
+    assert (robot.joint_names, robot.convention("urdf").joint_names) == (("a", "b"), ("b", "a"))
+
+
 def test_comments_and_instructions_of_an_element_tree_are_ignored_and_findings_are_reported() -> None:
     text = '<?x y?><robot name="r"><!-- arm --><link name="a"/><link name="b"/></robot>'
     for tree in (etree.fromstring(text), ElementTree.fromstring(text)):

@@ -146,6 +146,15 @@ def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks
     )
 
 
+def test_a_convention_in_file_order_has_the_joints_in_the_order_of_their_prims(read: Read) -> None:
+    links = BASE + body("first", "(1, 0, 0)") + body("second", "(2, 0, 0)") + body("third", "(3, 0, 0)")
+    ends = {"n": ("base", "second"), "b": ("second", "third"), "a": ("base", "first")}
+    robot = read(links + "".join(joint(name, "Revolute", *two, axis="Z") for name, two in ends.items()))
+    assert robot.convention("usd").joint_names == ("n", "b", "a")
+    assert robot.convention("mujoco").joint_names == ("n", "b", "a")
+    assert robot.joint_names == ("a", "n", "b")
+
+
 @pytest.mark.parametrize("unit", [0.01, 0.0254])
 def test_lengths_are_in_the_unit_of_the_stage(read: Read, unit: float) -> None:
     robot = read(ARM, unit=unit)

@@ -498,10 +498,14 @@ def _read_values(
     word, _, count = text.partition(":")
     if word == "random":
         n = _read_count(where, count) if count else _RANDOM_SAMPLES
-        if letter != "q":
-            rates: FloatArray = rng.standard_normal((n, len(names)))
-            return rates
-        drawn = sample(robot.tree, n, rng)
+        try:
+            if letter != "q":
+                rates: FloatArray = rng.standard_normal((n, len(names)))
+                return rates
+            drawn = sample(robot.tree, n, rng)
+        except (MemoryError, ValueError):  # For more than 2^63 numbers, NumPy raises ValueError.
+            problem, remedy = "N random samples do not fit into memory", "draw fewer samples"
+            raise InputError(problem, where=where, found=f"N = {n}", remedy=remedy) from None
         return conversion.to(drawn) if conversion else drawn
     if text.startswith("@"):
         return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]

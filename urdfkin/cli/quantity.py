@@ -108,9 +108,11 @@ def _read_trajectory(
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
     x = read_samples(robot, path, conversion)
+    settings = lock_settings(robot)
     if x.base is not None:
         reject_unused_options(context, _BASE_MOTION_OPTION_NAMES, "along a --trajectory with a moving base")
-    settings = lock_settings(robot)
+        arrays = x.base.placement, x.base.velocity, x.base.acceleration
+        settings |= {name: y.tolist() for name, y in zip(_BASE_MOTION_OPTION_NAMES, arrays, strict=True)}
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
         motion = complete_rates(robot.tree, x)

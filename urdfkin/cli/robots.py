@@ -14,6 +14,8 @@ import click
 
 from urdfkin.cli.options import load_robot, robot_argument
 from urdfkin.cli.output import Answer, answer_command
+from urdfkin.cli.streams import say
+from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_number_or_text
 from urdfkin.system.lazy_import import lazy_import
@@ -138,15 +140,19 @@ def order_command(robot: str, start: str | None, end: str | None) -> Answer:
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
         return _orders(loaded)
-    return _conversion_code(loaded.convention(start or "urdfkin"), loaded.convention(end or "urdfkin"))
+    return _conversion_code(loaded, start or "urdfkin", end or "urdfkin")
 
 
 def _orders(robot: Robot) -> Answer:
     from urdfkin.model.conventions import BUILT_IN_NAMES, find_convention
 
-    found = {
-        name: robot.convention(name) for name in BUILT_IN_NAMES if find_convention(name).order != "given"
-    }
+    found: dict[str, Conversion] = {}
+    for name in BUILT_IN_NAMES:
+        if find_convention(name).order != "given":
+            try:
+                found[name] = robot.convention(name)
+            except InputError as error:
+                say(f"urdfkin: warning: no column for {error}", err=True)
     cells = {name: _index_cells(robot, conversion) for name, conversion in found.items()}
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, column in cells.items():
@@ -204,10 +210,10 @@ def _convention_data(conversion: Conversion) -> dict[str, Any]:
     }
 
 
-def _conversion_code(start: Conversion, end: Conversion) -> Answer:
+def _conversion_code(robot: Robot, a: str, b: str) -> Answer:
     from urdfkin.model.conventions import find_reordering
 
-    a, b = start.convention.name, end.convention.name
+    start, end = robot.convention(a), robot.convention(b)
     found = {letter: find_reordering(letter, start, end) for letter in "qv"}
     names = {"q": end.coordinate_names, "v": end.velocity_names}
 
@@ -224,10 +230,14 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"
         if note := end.convention.note:
-            yield f"# {b}: {note}"
+            yield f"# {end.convention.name}: {note}"
 
     def data() -> dict[str, Any]:
-        document: dict[str, Any] = {"from": a, "to": b, "joints": list(end.joint_names)}
+        document: dict[str, Any] = {
+            "from": start.convention.name,
+            "to": end.convention.name,
+            "joints": list(end.joint_names),
+        }
         for letter, one in found.items():
             entry = None
             if one is not None:

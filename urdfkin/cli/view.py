@@ -156,7 +156,7 @@ PANELS = (
     default=1.0,
     help="With --to: duration of the motion in seconds.",
 )
-@samples_option(201, "With --to: number of samples along the line.", minimum=3)
+@samples_option(201, "With --to: number of samples along the line.", minimum=3, maximum=10_000_000)
 @seed_option
 @click.option(
     "--panel",

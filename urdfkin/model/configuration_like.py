@@ -141,9 +141,12 @@ with 'neutral, elbow=...'
                 i = index[name]
                 label = f"{where}, {name}"
                 number = self._parse_number(value, label, self.units[i]) if isinstance(value, str) else value
-                columns[i] = as_floats(number, label)
+                own = {i: as_floats(number, label)}
             else:
-                columns |= self._parse_joint(name, value, where)
+                own = self._parse_joint(name, value, where)
+            if twice := [self.names[i] for i in own if i in columns]:
+                raise InputError("a number is given twice", where=where, found=join_names(twice))
+            columns |= own
         missing = [name for i, name in enumerate(self.names) if i not in columns]
         if missing and pose is None:
             begin = f"'neutral, {next(iter(values), missing[0])}=...'"

@@ -679,7 +679,11 @@ class Robot(Displayable):
         with import_lock:
             from urdfkin.model.conventions import Conversion, find_convention
 
-        return Conversion(self.tree, self.urdf, find_convention(name), joints)
+        if joints is not None:
+            joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints")]
+        # The URDF text of these sources contains no masses. Only MJCF and USD files have a digest.
+        has_masses = not self.origin.sha256 and self.source not in ("<pinocchio.Model>", "<yourdfpy>")
+        return Conversion(self.tree, self.urdf, find_convention(name), joints, has_masses=has_masses)
 
     def with_convention(
         self, name: str | Path | Convention, joints: Sequence[str] | None = None

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from numpy.typing import ArrayLike
+import numpy as np
 
+from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.conventions.conversion import Conversion
 from urdfkin.model.tree import FloatArray
 
@@ -80,16 +82,18 @@ class ConventionRobot:
         result: Certificate = self.robot.certificate()
         return result
 
-    def placement(self, q: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
+    def placement(self, q: ConfigurationLike, frame: Any = None, **options: Any) -> FloatArray:
         """Return T_world_frame (..., 4, 4); see `Robot.placement`."""
         return self._call(self.robot.placement, (q,), frame, **options)[1]
 
-    def relative_placement(self, q: ArrayLike, frame: Any, relative_to: Any, **options: Any) -> FloatArray:
+    def relative_placement(
+        self, q: ConfigurationLike, frame: Any, relative_to: Any, **options: Any
+    ) -> FloatArray:
         """Return the pose (..., 4, 4) of `frame` relative to a frame; see `Robot.relative_placement`."""
         return self._call(self.robot.relative_placement, (q,), frame, relative_to, **options)[1]
 
     def velocity(
-        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
+        self, q: ConfigurationLike, v: ConfigurationLike, frame: Any = None, *arguments: Any, **options: Any
     ) -> FloatArray:
         """Return a frame's velocity (..., 6) with the target program's row order; see `Robot.velocity`."""
         return self.conversion.reorder_six_vector(
@@ -97,20 +101,28 @@ class ConventionRobot:
         )
 
     def acceleration(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
+        self,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
+        frame: Any = None,
+        *arguments: Any,
+        **options: Any,
     ) -> FloatArray:
         """Return the target program's classical acceleration (..., 6); see `Robot.acceleration`."""
         return self.conversion.reorder_six_vector(
             self._call(self.robot.acceleration, (q, v, a), frame, *arguments, **options)[1]
         )
 
-    def jacobian(self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any) -> FloatArray:
+    def jacobian(
+        self, q: ConfigurationLike, frame: Any = None, *arguments: Any, **options: Any
+    ) -> FloatArray:
         """Return the target program's Jacobian (..., 6, nv) of a frame; see `Robot.jacobian`."""
         ours, J = self._call(self.robot.jacobian, (q,), frame, *arguments, **options)
         return self.conversion.jacobian(ours[0], J)
 
     def jacobian_rate(
-        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
+        self, q: ConfigurationLike, v: ConfigurationLike, frame: Any = None, *arguments: Any, **options: Any
     ) -> FloatArray:
         """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
         ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *arguments, **options)
@@ -118,31 +130,44 @@ class ConventionRobot:
         J = self.robot.jacobian(ours[0], frame, *arguments, **{**options, "out": None})
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 
-    def hessian(self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any) -> FloatArray:
+    def hessian(self, q: ConfigurationLike, frame: Any = None, *arguments: Any, **options: Any) -> FloatArray:
         """Return the derivatives (..., 6, nv, nv) of the target program's Jacobian; see `Robot.hessian`."""
         ours, H = self._call(self.robot.hessian, (q,), frame, *arguments, **options)
         J = self.robot.jacobian(ours[0], frame, *arguments, **{**options, "out": None})
         return self.conversion.hessian(ours[0], J, H)
 
     def analytical_jacobian(
-        self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
+        self, q: ConfigurationLike, frame: Any = None, *arguments: Any, **options: Any
     ) -> FloatArray:
         """Return the target program's analytical Jacobian; see `Robot.analytical_jacobian`."""
         ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *arguments, **options)
         return self.conversion.columns(ours[0], J)
 
-    def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
+    def imu(
+        self,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
+        frame: Any = None,
+        **options: Any,
+    ) -> FloatArray:
         """Return an IMU's readings (..., 6), [accelerometer; gyroscope]; see `Robot.imu`."""
         return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
 
     def _call(
         self, method: Callable[..., FloatArray], inputs: tuple[Any, ...], *arguments: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Return the inputs in urdfkin's convention, and the method's result for these inputs."""
-        read: list[ArrayLike] = [
-            self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
-            for letter, x in zip("qva", inputs, strict=False)
-        ]
-        result = self.conversion.from_(*read)
-        ours: tuple[FloatArray, ...] = result if isinstance(result, tuple) else (result,)
-        return ours, method(*ours, *arguments, **options)
+        """Return the inputs in urdfkin's convention, and the method's result for these inputs.
+
+        The returned inputs have all batch axes of the result. The result may also have an axis of frames.
+        """
+        for letter, x in zip("qva", inputs, strict=False):
+            if x is None:
+                raise InputError(f"{letter} must be real numbers", found="None")
+        converted = self.conversion.from_(*inputs)
+        ours: tuple[FloatArray, ...] = converted if isinstance(converted, tuple) else (converted,)
+        result = method(*ours, *arguments, **options)
+        base = options.get("base")
+        shapes = [*(x.shape[:-1] for x in ours), *([] if base is None else [base.batch_shape])]
+        shape = np.broadcast_shapes(*shapes)
+        return tuple(np.broadcast_to(x, (*shape, x.shape[-1])) for x in ours), result

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors import InputError, QuestionsSection, SourceError
+from urdfkin.errors import InputError, QuestionsSection, RangeError, SourceError, UrdfkinError
 from urdfkin.errors.numbers import (
     UNIT_SHORT_NAMES,
     number_remedy,
@@ -67,15 +67,18 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
     Pickled objects are rejected, because unpickling can execute code from the file.
     """
     try:
-        with np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise ValueError("a single array")
+        archive = np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise ValueError("a single array")
+        with archive:
             _check_names(path, archive.files, shapes, required)
             entries = archive.zip.infolist() if archive.zip else []
             size = sum(entry.file_size for entry in entries)
             if size > MAX_DATA_BYTES:
                 raise ValueError(f"arrays of {size} bytes, more than {MAX_DATA_BYTES}")
             given = {name: archive[name] for name in archive.files}
+    except UrdfkinError:  # An InputError is a ValueError.
+        raise
     except (
         ValueError,
         EOFError,
@@ -202,8 +205,9 @@ def make_line_trajectory(
     in seconds. `samples` is the number of samples, including the first and the last sample.
 
     Raises:
-        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length;
-            or a number is not finite.
+        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length or
+            is a batch; or a number is not finite.
+        RangeError: the duration is so short that an acceleration is not a finite double.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)
@@ -213,11 +217,16 @@ def make_line_trajectory(
             found=f"{duration} s, {samples}",
         )
     q_0, q_1 = parse_finite(robot.tree, start, "q"), parse_finite(robot.tree, end, "q")
+    if q_0.ndim != 1 or q_1.ndim != 1:
+        raise InputError("a line needs one start and one end", found=f"shapes {q_0.shape}, {q_1.shape}")
     t = np.linspace(0.0, duration, samples)
     u = (t / duration)[:, np.newaxis]
     s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
-    s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
-    s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
+    with np.errstate(over="ignore"):
+        s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+        s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration / duration
+    if not np.isfinite(s_2).all():
+        raise RangeError("the duration is too short", found=f"{duration} s")
     step = difference(robot.tree, q_0, q_1)
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
@@ -357,6 +366,13 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
         names[x] = [f"{prefix}{name}" for name in own]
         units |= {f"{prefix}{name}": unit for name, unit in own.items()}
     optional = ["t", *names["v"], *names["a"]]
+    if ambiguous := [name for name, count in Counter([*names["q"], *optional]).items() if count > 1]:
+        raise InputError(
+            "a joint's name is also the name of another column",
+            where=str(path),
+            found=join_names(ambiguous),
+            remedy="use an .npz file",
+        )
     what = (
         "a trajectory"
         if conversion is None

@@ -99,7 +99,7 @@ def convert_yourdfpy_robot(robot: yourdf.Robot) -> str:
         axes = {record.name: np.array(record.axis) for record in records}
         rows = [(replace(one, axis=axes[one.name]), up, down) for one, up, down in make_joint_rows(records)]
         root = find_root_link(robot.name, [link.name for link in robot.links], records)
-        return to_urdf(build_tree(robot.name, root, rows))
+        return to_urdf(build_tree(robot.name, root, rows), [record.name for record in records])
     except UrdfkinError:
         raise
     except (TypeError, ValueError, AttributeError, IndexError) as error:

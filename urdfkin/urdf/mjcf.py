@@ -80,6 +80,8 @@ class Mjcf:
         mimic_equalities: Name of the mimic joint, by the index of the equality with the mimic rule.
         other_equalities: Indices of the active joint equalities that are not mimic rules of the tree.
         with_shapes: Whether `model` contains the shapes and inertias of the file.
+        aligns_free_bodies: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
+        joint_names: Names of all joints, in the order of the file.
     """
 
     tree: KinematicTree
@@ -92,6 +94,7 @@ class Mjcf:
     remarks: tuple[MjcfRemark, ...]
     with_shapes: bool
     aligns_free_bodies: bool
+    joint_names: tuple[str, ...]
 
     def qpos(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's qpos (n, `model.nq`), with the values of mimic joints, for urdfkin's q (n, nq)."""
@@ -303,6 +306,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
     return Mjcf(
         tree, model, fused_model, reader.frames, reader.qpos_index, reader.mimic_equalities,
         frozenset(reader.other_equalities), (*reader.remarks, *notes), with_shapes, bool(aligned),
+        reader.joint_names,
     )  # fmt: skip
 
 
@@ -475,6 +479,10 @@ class _MjcfReader:
                     found = f"{row[~np.isfinite(row)][0]:g}"
                     message = "a position, orientation or axis is not finite"
                     raise InputError(message, where=where, found=found, remedy="write finite numbers")
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint, _, _ in self._joints)
 
     def _add_fixed_joint(self, T: FloatArray, parent: str, child: str) -> None:
         name = make_unique(f"{child}_fixed", self._used_joint_names)

@@ -158,6 +158,7 @@ class Usd:
             5. the distance (m) between the joint frame and the child frame.
         joints: The joint prims in the tree. The keys are the paths of the prims.
         meters_per_unit: The stage's metersPerUnit.
+        joint_names: Names of all joints, in the order of the joint prims in the stage.
     """
 
     tree: KinematicTree
@@ -170,6 +171,7 @@ class Usd:
     meters_per_unit: float
     remarks: tuple[UsdRemark, ...]
     files: tuple[str, ...]
+    joint_names: tuple[str, ...]
 
 
 def version() -> str:
@@ -390,6 +392,7 @@ class _StageReader:
     _bodies: dict[str, _Body] = field(default_factory=dict)
     _edges: list[_JointPrim] = field(default_factory=list)
     _joints_read: dict[str, UsdJoint] = field(default_factory=dict)
+    _joint_names: tuple[str, ...] = ()
     _single_rounding_terms: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
     # Pinocchio itself uses the names `universe` and `root_joint`.
     _used_link_names: set[str] = field(default_factory=lambda: {"universe"})
@@ -437,6 +440,7 @@ class _StageReader:
             self._meters_per_unit,
             tuple(self.remarks),
             files,
+            self._joint_names,
         )
 
     # -- the stage -----------------------------------------------------------------------------------
@@ -928,7 +932,9 @@ class _StageReader:
         for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
             if path is not None:
                 links[path] = make_unique(self._make_link_name(path), self._used_link_names)
-        rows = [row for edge, back in ordered for row in self._make_joints(edge, links, backwards=back)]
+        own = {edge.path: list(self._make_joints(edge, links, backwards=back)) for edge, back in ordered}
+        rows = [row for edge, _ in ordered for row in own[edge.path]]
+        in_stage = [joint.name for edge in self._edges for joint, _, _ in own.get(edge.path, ())]
         rules = dict(self._resolve_mimic_rules([edge for edge, _ in ordered]))
         rows = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in rows]
         for edge, _ in ordered:
@@ -948,6 +954,7 @@ class _StageReader:
             self._single_rounding_terms[joint.name] = *bounds, joint.length, 0.0, 0.0
             rows.append((joint, links[parent], link))
             prims[link] = path
+        self._joint_names = (*in_stage, *(joint.name for joint, _, _ in rows[len(in_stage) :]))
         self._joints_read = {edge.path: self._joints_read[edge.path] for edge, _ in ordered}
         tops = {path.split("/")[1] for path in (group.path, *group.bodies) if path != "/"}
         top = group.path.split("/")[1] or (tops.pop() if len(tops) == 1 else Path(self.source).stem)

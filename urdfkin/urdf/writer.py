@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rpy_of
@@ -18,8 +18,10 @@ from urdfkin.system.files import Edit
 from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 
 
-def to_urdf(tree: KinematicTree) -> str:
+def to_urdf(tree: KinematicTree, joint_names: Sequence[str] | None = None) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
+
+    `joint_names` is the order of all joints, and of their child links, in the text. None: the tree's order.
 
     URDF 1.0 requires finite limits of effort and velocity in a <limit> element. Infinite limits are omitted.
     If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
@@ -29,9 +31,12 @@ def to_urdf(tree: KinematicTree) -> str:
     """
     version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{escape_attribute(tree.name)}"{version}>']
-    lines += [f'  <link name="{escape_attribute(link)}"/>' for link in tree.links]
-    for number, joint in enumerate(tree.joints):
-        lines += _write_joint(joint, tree.links[joint.parent], tree.links[number + 1])
+    order = range(len(tree.joints)) if joint_names is None else list(map(tree.joint_index, joint_names))
+    links = [tree.links[0], *(tree.links[i + 1] for i in order)]
+    lines += [f'  <link name="{escape_attribute(link)}"/>' for link in links]
+    for i in order:
+        joint = tree.joints[i]
+        lines += _write_joint(joint, tree.links[joint.parent], tree.links[i + 1])
     lines.append("</robot>")
     return "\n".join(lines) + "\n"
 

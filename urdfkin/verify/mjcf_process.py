@@ -134,7 +134,7 @@ def _make_configurations(mjcf: Mjcf, samples: int) -> FloatArray:
 
 def _make_robot_answer(mjcf: Mjcf, q: FloatArray) -> dict[str, Any]:
     answer: dict[str, Any] = {
-        "urdf": to_urdf(mjcf.tree),
+        "urdf": to_urdf(mjcf.tree, mjcf.joint_names),
         "listed": [astuple(one) for one in mjcf.remarks],
         "whole": mjcf.with_shapes,
         "frames": [(name, kind) for name, (kind, _) in mjcf.frames.items()],

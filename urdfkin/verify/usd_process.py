@@ -49,7 +49,7 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
         articulation=request["articulation"],
     )
     return {
-        "urdf": to_urdf(usd.tree),
+        "urdf": to_urdf(usd.tree, usd.joint_names),
         "single": usd.single_rounding_terms,
         "remarks": [astuple(one) for one in usd.remarks],
         "prims": usd.prims,

@@ -2,8 +2,10 @@
 
 import inspect
 import itertools
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from tests.cli.running import good
 from tests.comparison.pairs import disguised, files_of, loaded
 from tests.comparison.pairs import robot as pair
 from tests.model.conventions.libraries import LIBRARIES
+from tests.model.test_named_coordinates import Columns
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.result import Sameness
@@ -167,6 +170,38 @@ def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
             assert np.array_equal(together[:, k], method(*inputs, frame))
 
 
+def test_each_argument_of_a_robot_in_a_convention_may_lack_batch_axes_of_the_others(dog: Robot) -> None:
+    robot, frames = dog.with_convention("mujoco"), ["FL_foot", "RR_foot"]
+    q, v, _ = robot.conversion.to(*_values(dog, 2))
+    found = robot.jacobian_rate(q[0], v, frames)
+    for k, i in itertools.product(range(2), range(2)):
+        assert np.allclose(found[k, i], robot.jacobian_rate(q[0], v[k], frames[i]), 0, 1e-13)
+    base = urdfkin.BaseMotion(velocity=np.arange(24.0).reshape(2, 2, 6))
+    for found in (robot.jacobian(q, "FL_foot", base=base), robot.jacobian(q[None], "FL_foot", base=base)):
+        assert np.allclose(found, robot.jacobian(q, "FL_foot"), 0, 1e-13)
+    H = robot.hessian(q, "FL_foot")
+    assert np.allclose(robot.hessian(q, "FL_foot", base=base), H, 0, 1e-13)
+
+
+def test_a_robot_in_a_convention_reads_and_refuses_arguments_as_the_robot_does(dog: Robot) -> None:
+    robot = dog.with_convention("mujoco")
+    q, v = robot.sample(3), np.zeros((2, robot.nv))
+    table = Columns(q[:, ::-1], robot.coordinate_names[::-1])
+    for mapping in (table, MappingProxyType(dict(zip(robot.coordinate_names, q.T, strict=True)))):
+        assert np.array_equal(robot.placement(mapping, "FL_foot"), robot.placement(q, "FL_foot"))
+        assert np.array_equal(robot.conversion.from_(mapping), robot.conversion.from_(q))
+    for call in (
+        lambda: robot.velocity(q, v, "FL_foot"),
+        lambda: robot.conversion.from_(q, v),
+        lambda: robot.conversion.to(dog.sample(3), v),
+        lambda: robot.conversion.matrix_rate(dog.sample(3), v),
+    ):
+        with pytest.raises(InputError, match=r"do not broadcast: found \(3,\), \(2,\)"):
+            call()
+    with pytest.raises(InputError, match="v must be real numbers: found None"):
+        robot.velocity(q, None, "FL_foot")  # type: ignore[arg-type]
+
+
 def test_an_output_array_does_not_change_the_result(dog: Robot) -> None:
     other = dog.with_convention("drake")
     q, v, _ = other.conversion.to(*_values(dog))
@@ -221,7 +256,8 @@ TWICE = "two joints have the same name in the convention: found"
         ('[joint.joint_1]\nname = "joint_2"', f"{TWICE} 'joint_2'"),
         ("[joint.joint_1]\nsign = 2", "joint joint_1: `sign` must be 1 or -1: found 2"),
         ("[joint.joint_1]\nunit = 'mm'", "joint joint_1: this `unit` is for a joint with a length"),
-        ("[joint.joint_1]\nunit = -1", "`unit` must be positive"),
+        ("[joint.joint_1]\nunit = -1", "`unit` must be a positive number"),
+        ("[joint.joint_1]\nunit = 1e-320", "`unit` must be a positive number from 1e-100 to 1e+100"),
         ("[joint.joint_1]\nzero = nan", "`zero` must be a finite number"),
         ('joints = ["joint_1", "end"]', "the order of joints contains a fixed joint: found end"),
         ('quaternion = "wxzy"', "`quaternion` must be one of: xyzw, wxyz: found 'wxzy'"),
@@ -247,6 +283,7 @@ def test_an_invalid_convention_file_is_an_error_with_the_place(
         ("[joint.elbow]", "elbow"),
         ('joints = ["joint_1", "joint_3"]', "joint_3"),
         ('like = "mujocco"', "mujoco, "),
+        ('like = ["mujoco"]', "unknown convention"),
         ("quaternoin = 1", "did you mean quaternion"),
         ("[joint.joint_1]\nsing = 1", "did you mean sign"),
         (None, "did you mean mujoco"),
@@ -260,6 +297,58 @@ def test_an_unknown_convention_or_name_in_its_file_is_refused_with_the_nearest_n
     with pytest.raises(UnknownNameError) as caught:
         arm.convention(file if text else "mujocco")
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["drake", "usd"])
+def test_a_matrix_with_a_wrong_number_of_columns_is_refused(name: str, arm: Robot) -> None:
+    conversion, q, J, H = arm.convention(name), [0.0, 0.0], np.zeros((6, 2)), np.zeros((6, 2, 3))
+    calls: tuple[Callable[[], FloatArray], ...] = (
+        lambda: conversion.jacobian(q, np.zeros((6, 3))),
+        lambda: conversion.columns(q, np.zeros(2)),
+        lambda: conversion.from_jacobian(q, np.zeros((6, 1))),
+        lambda: conversion.hessian(q, J, H),
+    )
+    for call in calls:
+        with pytest.raises(InputError, match=r"[JH] must have the shape \(..., rows, 2(, 2)?\): found \("):
+            call()
+
+
+@pytest.mark.parametrize("joints", ["joint_1", 3, ["joint_1", 2], ["joint_1", None]])
+def test_an_order_that_is_no_list_of_names_is_refused(joints: Any, arm: Robot) -> None:
+    with pytest.raises(InputError, match=r"joints must be a (list of names|name)"):
+        arm.convention("mujoco", joints)
+
+
+def test_a_quaternion_in_a_convention_has_norm_1_or_the_error_names_the_joint(dog: Robot) -> None:
+    mujoco = dog.convention("mujoco")
+    q, v, _ = mujoco.to(*_values(dog))
+    q[:, 3:7] *= 1.0 + 1e-9
+    assert np.allclose(np.linalg.norm(mujoco.from_(q)[:, 3:7], axis=1), 1.0, 0, 1e-15)
+    q[1, 3:7] *= 2.0
+    for arguments in ((q,), (q, v)):
+        with pytest.raises(InputError, match="of joint root_joint must be a unit quaternion: found norm 2"):
+            mujoco.from_(*arguments)
+
+
+@pytest.mark.parametrize("xyz", ["", "1 2", "1,2,3", "nan 0 0"])
+def test_an_invalid_centre_of_mass_is_an_error_that_names_the_link(xyz: str) -> None:
+    inertial = f'<inertial><origin xyz="{xyz}"/><mass value="1"/></inertial>'
+    box = f'<robot name="box"><link name="body">{inertial}</link></robot>'
+    robot = urdfs.loaded(box, root_joint="floating", verify=False)
+    with pytest.raises(InputError, match="link body: the origin of <inertial> must be three finite numbers"):
+        robot.convention("newton")
+
+
+def test_the_order_of_joints_may_have_the_names_in_the_convention() -> None:
+    arm = built(joint("1", "continuous", "l0", "l1"), joint("a-b", "continuous", "l1", "l2"), verify=False)
+    for name, joints in (
+        ("usd", ["tn__ab_h3", "tn__1_"]),
+        ("isaaclab", ["a_b", "a_1"]),
+        ("usd", ["a-b", "1"]),
+    ):
+        conversion = arm.convention(name, joints)
+        assert (conversion.joint_names == tuple(joints)) == ("1" not in joints)
+        assert conversion.to([0.0, 0.0], [1.0, 2.0])[1].argmax() == 0
 
 
 def test_a_convention_without_a_known_joint_order_needs_an_explicit_order(arm: Robot) -> None:
@@ -473,6 +562,24 @@ def test_the_cosine_and_sine_of_a_joint_do_not_depend_on_the_unit_of_angles(tmp_
     assert np.allclose(q, [np.cos(np.pi / 2 - 0.5), np.sin(np.pi / 2 - 0.5)], 0, 1e-15)
     assert np.allclose(v, [-180 / np.pi], 0, 1e-13)
     assert np.allclose(program.from_(q), [0.5], 0, 1e-15)
+
+
+@pytest.mark.parametrize(
+    ("root_joint", "symbol", "name"),
+    [
+        ("floating", "v", "root_joint.wz"),
+        ("planar", "v", "root_joint.wz"),
+        ("planar", "q", "root_joint.angle"),
+    ],
+)
+def test_an_angle_of_a_free_joint_in_degrees_has_no_other_unit(
+    root_joint: Any, symbol: str, name: str
+) -> None:
+    program = urdfkin.load("planar_two_link", root_joint=root_joint, verify=False).convention("usd")
+    layout = program.layout(symbol)
+    assert layout.parse(f"neutral, {name}=90")[layout.names.index(name)] == 90.0
+    with pytest.raises(InputError, match="wrong unit: found '90deg'; use no unit"):
+        layout.parse(f"neutral, {name}=90deg")
 
 
 def test_the_error_of_a_mimic_value_has_the_unit_of_the_convention(tmp_path: Path) -> None:

@@ -36,6 +36,8 @@ from urdfkin.system.files import abbreviate_path, may_exist, read_text
 
 #: Factors that convert rad or m to each unit.
 _UNITS = {"rad": 1.0, "deg": 180.0 / math.pi, "turn": 0.5 / math.pi, "m": 1.0, "mm": 1000.0}
+#: Converted values and Jacobians stay finite.
+_SMALLEST_UNIT = 1e-100
 _ANGLES, _LENGTHS = ("rad", "deg", "turn"), ("m", "mm")
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "order": (
@@ -125,6 +127,11 @@ class Convention:
     def angle_factor(self) -> float:
         return _UNITS[self.angle]
 
+    @property
+    def angle_unit(self) -> str:
+        """Unit of angles that a text may state, as in "90deg"; "" if a text must state no unit."""
+        return "rad" if self.angle == "rad" else ""
+
 
 @cache
 def _load_built_in() -> dict[str, Convention]:
@@ -165,7 +172,7 @@ def parse_convention(text: str, where: str, name: str) -> Convention:
     except tomllib.TOMLDecodeError as error:
         raise InputError("the convention file is not valid TOML", where=where, found=str(error)) from None
     like = entries.pop("like", "urdf")
-    if like not in _load_built_in():
+    if not isinstance(like, str) or like not in _load_built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN_NAMES, where=where)
     base = replace(
         _load_built_in()[like], name=name, title=name, evidence="", measurement="", sources=(), note=""
@@ -230,9 +237,9 @@ def _parse_rule(rule: dict[str, Any], where: str) -> JointRule:
             raise UnknownNameError("unit", unit, _UNITS, where=where)
     elif unit is not None:
         unit = _as_number(unit, "unit", where)
-        if unit <= 0.0:
+        if not _SMALLEST_UNIT <= unit <= 1.0 / _SMALLEST_UNIT:
             raise InputError(
-                "`unit` must be positive",
+                f"`unit` must be a positive number from {_SMALLEST_UNIT:g} to {1.0 / _SMALLEST_UNIT:g}",
                 where=where,
                 found=safe_repr(unit),
                 remedy="write the number of units in one turn, for example 360 for degrees",

@@ -18,16 +18,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.errors.numbers import parse_float
+from urdfkin.errors.validators import safe_repr
+from urdfkin.kinematics.inputs import as_finite, as_floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
-from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout
+from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
 from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
@@ -61,7 +63,8 @@ class _FreeJoint:
     q_index: int  #: First index in urdfkin's q.
     v_index: int  #: First index in urdfkin's v.
     target_slice: slice  #: Indices in the target program's v.
-    velocity_point: FloatArray  #: (3,) the link's origin or centre of mass, in the link's frame (m).
+    #: (3,) the link's origin or centre of mass, in the link's frame (m); None: unknown.
+    velocity_point: FloatArray | None
 
 
 class Conversion:
@@ -73,6 +76,7 @@ class Conversion:
         convention: The convention.
         joints: Order of the joints, which replaces the convention's order. `joints` is required if the
             convention has no order.
+        has_masses: False if `urdf` is converted from a source whose masses urdfkin does not read.
 
     Raises:
         InputError: The order is wrong, two joints get the same name, or a rule does not fit its joint.
@@ -88,12 +92,18 @@ class Conversion:
     """
 
     def __init__(
-        self, tree: KinematicTree, urdf: str, convention: Convention, joints: Sequence[str] | None = None
+        self,
+        tree: KinematicTree,
+        urdf: str,
+        convention: Convention,
+        joints: Sequence[str] | None = None,
+        *,
+        has_masses: bool = True,
     ) -> None:
         if joints is not None:
             convention = replace(convention, order="given", joints=tuple(joints))
         self.tree, self.convention = tree, convention
-        self._urdf = urdf
+        self._urdf, self._has_masses = urdf, has_masses
         for name in convention.rules:
             self._find_joint_index(name)
         self._order = self._find_order()
@@ -126,7 +136,7 @@ class Conversion:
                 remedy="pass the joint names in the order of this tool: joints=[...], or `joints` in a"
                 " TOML file",
             )
-        own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
+        own = {self._tool_name(one): one.name for one in self.tree.joints if one.original.kind.nv}
         all_names = [(name, self._find_joint_index(own.get(name, name))) for name in how.joints]
         named = [(name, i) for name, i in all_names if self.tree.joints[i].lock is None]
         order = [i for _, i in named]
@@ -205,8 +215,7 @@ class Conversion:
 
     def _add_joint(self, i: int) -> str:
         how, joint = self.convention, self.tree.joints[i]
-        rule = how.rules.get(joint.name, JointRule())
-        name = rule.name or spell_name(joint.name, how.names)
+        rule, name = how.rules.get(joint.name, JointRule()), self._tool_name(joint)
         q, v = self.tree.q_index[i], self.tree.v_index[i]
         if joint.kind is JointKind.FLOATING:
             self._refuse_rule(joint)
@@ -219,6 +228,10 @@ class Conversion:
         else:
             raise NotImplementedError(f"a {joint.kind} joint in another convention")
         return name
+
+    def _tool_name(self, joint: Joint) -> str:
+        rule = self.convention.rules.get(joint.name)
+        return rule.name if rule and rule.name else spell_name(joint.name, self.convention.names)
 
     def _refuse_rule(self, joint: Joint) -> None:
         rule = self.convention.rules.get(joint.name)
@@ -270,12 +283,12 @@ class Conversion:
         point = np.zeros(3) if how.point == "origin" else self._centre_of_mass(self.tree.links[i + 1])
         linear = [_TargetNumber(f"{name}.v{x}", v + k, unit="m") for k, x in enumerate("xyz")]
         angular = [
-            _TargetNumber(f"{name}.w{x}", v + 3 + k, how.angle_factor, unit="rad")
+            _TargetNumber(f"{name}.w{x}", v + 3 + k, how.angle_factor, unit=how.angle_unit)
             for k, x in enumerate("xyz")
         ]
         first = len(self._rates)
         self._rates += linear + angular if how.base_v == "linear first" else angular + linear
-        if "parent" in (how.linear, how.angular) or point.any():
+        if "parent" in (how.linear, how.angular) or point is None or point.any():
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 6), point))
 
     def _add_planar(self, i: int, name: str, q: int, v: int) -> None:
@@ -286,18 +299,28 @@ class Conversion:
                 _TargetNumber(f"{name}.{part}", q + 2, cos_or_sin=part) for part in ("cos", "sin")
             ]
         else:
-            self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
+            self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit=how.angle_unit))
         first = len(self._rates)
         self._rates += [_TargetNumber(f"{name}.v{x}", v + k, unit="m") for k, x in enumerate("xy")]
-        self._rates.append(_TargetNumber(f"{name}.wz", v + 2, how.angle_factor, unit="rad"))
+        self._rates.append(_TargetNumber(f"{name}.wz", v + 2, how.angle_factor, unit=how.angle_unit))
         if how.planar == "parent":
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
-    def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none."""
+    def _centre_of_mass(self, link: str) -> FloatArray | None:
+        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none.
+
+        None: The source's masses are unknown.
+        """
+        if not self._has_masses:
+            return None
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
-                return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
+                text = origin.get("xyz", "0 0 0")
+                point = [parse_float(word) for word in text.split()]
+                if len(point) != 3 or None in point:
+                    claim = "the origin of <inertial> must be three finite numbers"
+                    raise InputError(claim, where=f"link {link}", found=safe_repr(text))
+                return np.array(point, dtype=np.float64)
         return np.zeros(3)
 
     def _precompute(self) -> None:
@@ -417,18 +440,20 @@ class Conversion:
         return results[0] if len(results) == 1 else tuple(results)
 
     @overload
-    def from_(self, q: ArrayLike) -> FloatArray: ...
+    def from_(self, q: ConfigurationLike) -> FloatArray: ...
     @overload
-    def from_(self, q: ArrayLike, v: ArrayLike, a: ArrayLike | None = None) -> tuple[FloatArray, ...]: ...
     def from_(
-        self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+        self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
+    ) -> tuple[FloatArray, ...]: ...
+    def from_(
+        self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a from the target program's convention.
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
                 A mimic joint's value contradicts its rule.
-                The norm of a (cos, sin) pair is not 1 within 1e-6.
+                The norm of a (cos, sin) pair or of a quaternion is not 1 within 1e-6.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -437,21 +462,28 @@ class Conversion:
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
-        results = [self._from_target_q(self._check_target(q, "q"))]
-        if v is not None:
-            results.append(self._from_target_rates(results[0], self._check_target(v, "v")))
-        if a is not None:
-            results.append(self._from_target_rates(results[0], self._check_target(a, "a"), results[1]))
+        given = zip((q, v, a), "qva", strict=True)
+        inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
+        _check_batch_shapes(inputs)
+        results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
+        if len(inputs) > 1:
+            results.append(self._from_target_rates(results[0], inputs[1]))
+        if len(inputs) > 2:
+            results.append(self._from_target_rates(results[0], inputs[2], results[1]))
         return results[0] if len(results) == 1 else tuple(results)
 
     def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
         if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", values, strict=True)
-        return [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
+        inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
+        _check_batch_shapes(inputs)
+        return inputs
 
-    def _check_target(self, value: ArrayLike, symbol: str) -> FloatArray:
-        array, width = as_finite(value, symbol), self.nq if symbol == "q" else self.nv
+    def _check_target(self, value: ConfigurationLike, symbol: str) -> FloatArray:
+        named = as_text_or_mapping(value, symbol)
+        numbers = cast("ArrayLike", value) if named is None else self.layout(symbol).parse(named)
+        array, width = as_finite(numbers, symbol), self.nq if symbol == "q" else self.nv
         if array.shape[-1:] != (width,):
             names = self.coordinate_names if symbol == "q" else self.velocity_names
             raise InputError(
@@ -626,6 +658,12 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
+        if block.velocity_point is None:
+            raise InputError(
+                "velocities of a centre of mass need the masses, which urdfkin reads only from a URDF file",
+                where=f"{how.name}: joint {block.joint.name}",
+                remedy='load a URDF file, or write a convention file with point = "origin"',
+            )
         R, own_axes = rotation_from_quaternion(q[..., block.q_index + 3 : block.q_index + 7]), np.eye(3)
         if v is not None:
             R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
@@ -658,7 +696,7 @@ class Conversion:
 
     def jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert a Jacobian J (..., 6, nv) to S J M^-1."""
-        return self.columns(q, self.reorder_six_vector(J, -2))
+        return self.columns(q, self.reorder_six_vector(_as_matrices(J, "J", self.tree.nv), -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert the columns of a matrix J to the target program, as J M^-1.
@@ -673,7 +711,7 @@ class Conversion:
             InputError: The target program has additional columns for mimic joints.
         """
         self._refuse_mimic_columns()
-        array = np.asarray(J, dtype=np.float64)
+        array = _as_matrices(J, "J", self.tree.nv)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_index]
         return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
@@ -687,7 +725,7 @@ class Conversion:
             q: Configuration.
             J: (..., 6, program's nv) Jacobian.
         """
-        array = self.reorder_six_vector(J, -2)
+        array = self.reorder_six_vector(_as_matrices(J, "J", self.nv), -2)
         return array @ _add_frame_axis(self.matrix(q), array.ndim)
 
     def jacobian_rate(
@@ -702,8 +740,8 @@ class Conversion:
             return converted
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
-        array = self.reorder_six_vector(J, -2)
-        return converted + array @ _add_frame_axis(change, array.ndim)
+        # J lacks the batch axes that only v has.
+        return converted + self.reorder_six_vector(J, -2) @ _add_frame_axis(change, converted.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
         """Convert urdfkin's kinematic Hessian to the target program's Hessian.
@@ -716,8 +754,8 @@ class Conversion:
         self._refuse_mimic_columns()
         inverse, tensor, columns = (
             self.inverse_matrix(q),
-            self.reorder_six_vector(H, -3),
-            self.reorder_six_vector(J, -2),
+            self.reorder_six_vector(_as_matrices(H, "H", self.tree.nv, self.tree.nv), -3),
+            self.reorder_six_vector(_as_matrices(J, "J", self.tree.nv), -2),
         )
         W = _add_frame_axis(inverse, columns.ndim)
         converted: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
@@ -866,6 +904,23 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
         )
         for at in range(count)
     ]
+
+
+def _check_batch_shapes(inputs: Sequence[FloatArray]) -> None:
+    shapes = [x.shape[:-1] for x in inputs]
+    try:
+        np.broadcast_shapes(*shapes)
+    except ValueError:
+        found = ", ".join(map(str, shapes))
+        raise InputError("the batch shapes of q, v and a do not broadcast", found=found) from None
+
+
+def _as_matrices(value: ArrayLike, name: str, *columns: int) -> FloatArray:
+    array, n = as_floats(value, name), len(columns)
+    if array.ndim <= n or array.shape[-n:] != columns:
+        shape = ", ".join(map(str, ("...", "rows", *columns)))
+        raise InputError(f"{name} must have the shape ({shape})", found=str(array.shape))
+    return array
 
 
 def _multiply(B: FloatArray, x: FloatArray) -> FloatArray:
