@@ -135,9 +135,8 @@ def validate(
     if oracle_library(oracle) is not PINOCCHIO:
         robot_inputs = [replace(x, origin=replace(x.origin, oracle=oracle)) for x in robot_inputs]
     chunking = Chunking(samples)
-    collector = ResultCollector(
-        robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
-    )
+    chunks = chunks_of_shard(len(robot_inputs), chunking, shard)
+    collector = ResultCollector(robot_inputs, chunking, chunks, progress)
     # The machines of an executor compute their own memory limits.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
@@ -146,7 +145,7 @@ def validate(
         stored_answers = None
         if folder is not None:
             manifest = Manifest.of(robot_inputs, samples, seed, started.isoformat(timespec="seconds"))
-            context = open_store(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            context = open_store(folder, manifest, _warn, shard=shard, retry=None if retry is None else chunks)
             stored_answers = stack.enter_context(context)
         try:
             if stored_answers is not None:
