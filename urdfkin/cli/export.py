@@ -139,7 +139,7 @@ def export_command(
     to = format_from_suffix(context, output, _LANGUAGES_OF_SUFFIXES, "c", "to")
     loaded = load_robot(robot, verify=verify)
     names = [word.strip() for words in quantities for word in words.split(",")] or list(DEFAULT_QUANTITIES)
-    frame = frame or loaded.tip_frame
+    frame = loaded.tip_frame if frame is None else frame
     code = code_for_language(
         make_robot_code(loaded, frame, names, reference, form, name=name, verify=verify), to
     )

@@ -469,7 +469,8 @@ def read_inputs(
         q_, v_, a_ = conversion.from_(q_, v_, a_)
     warn_of_limits(robot, q_)
     settings = lock_settings(robot)
-    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, settings=settings, conversion=conversion)
+    frame = robot.tip_frame if frame is None else frame
+    return Inputs(robot, frame, q_, v_, a_, settings=settings, conversion=conversion)
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
@@ -592,12 +593,12 @@ def with_base_motion(
 
     if placement is None and velocity is None and acceleration is None:
         return x
-    still = "0,0,0,0,0,0"
-    T = _placements(
-        *_read_rows(placement or still, "--base-placement", (_RPY_POSE_NAMES, _QUATERNION_POSE_NAMES))
+    placement, velocity, acceleration = (
+        "0,0,0,0,0,0" if text is None else text for text in (placement, velocity, acceleration)
     )
-    v, _ = _read_rows(velocity or still, "--base-velocity", (_SIX_VECTOR_NAMES,))
-    a, _ = _read_rows(acceleration or still, "--base-acceleration", (_SIX_VECTOR_NAMES,))
+    T = _placements(*_read_rows(placement, "--base-placement", (_RPY_POSE_NAMES, _QUATERNION_POSE_NAMES)))
+    v, _ = _read_rows(velocity, "--base-velocity", (_SIX_VECTOR_NAMES,))
+    a, _ = _read_rows(acceleration, "--base-acceleration", (_SIX_VECTOR_NAMES,))
     problem = "the batches of q, v, a and the base motion have different lengths"
     q, v_, a_, *base = _repeat_single(problem, [x.q, x.v, x.a, T, v, a])
     names = "base_placement", "base_velocity", "base_acceleration"

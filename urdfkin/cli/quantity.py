@@ -119,7 +119,7 @@ def _read_trajectory(
         print_trajectory_notes(motion)
     warn_of_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
-    frame = frame or robot.tip_frame
+    frame = robot.tip_frame if frame is None else frame
     return Inputs(robot, frame, q, v, a, t, x.base, settings, conversion, is_trajectory=True)
 
 

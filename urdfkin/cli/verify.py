@@ -124,7 +124,7 @@ def verify_command(
                 raise click.UsageError("--batch is for a function in Python, and --program for a program")
             name = quantity or "jacobian"
             reference_ = None if name in ("placement", "imu") else reference
-            frame_ = frame or loaded.tip_frame
+            frame_ = loaded.tip_frame if frame is None else frame
             try:
                 words = shlex.split(target)
             except ValueError as error:

@@ -217,7 +217,8 @@ def plot_command(
     else:
         trajectory_ = _make_line(loaded, start, end or "", duration, samples, seed, convention)
     with report_compilation():
-        motion = frame_motion(loaded, trajectory_, frame or loaded.tip_frame, reference)
+        frame = loaded.tip_frame if frame is None else frame
+        motion = frame_motion(loaded, trajectory_, frame, reference)
     write_file(output, figure_bytes(plot_motion(loaded, motion, trajectory_, panels), output))
     say(f"{loaded.name}: {motion.frame}: {check_summary(motion, trajectory_)}")
     context.exit(3 if motion.unverified_reason is not None else 0 if motion.agrees else 1)

@@ -323,7 +323,7 @@ def verify_function(
         function,
         robot,
         row,
-        frame or robot.tip_frame,
+        robot.tip_frame if frame is None else frame,
         None if not row.has_reference else Reference.of(reference),
         as_int(samples, "samples", 0),
         as_int(seed, "seed", 0),

@@ -120,7 +120,8 @@ def make_robot_inputs(
                 name = unambiguous_path(Path(robot))
             else:
                 name = robot if isinstance(robot, str) else f"<{type(robot).__name__}>"
-            robot_inputs.append(RobotInput(b"", Origin(name, mimic, root_joint)))
+            origin = robot.origin if isinstance(robot, Robot) else Origin(name, mimic, root_joint)
+            robot_inputs.append(RobotInput(b"", origin))
             errors[i] = error
     return robot_inputs, errors
 
