@@ -82,6 +82,26 @@ def test_validate_reads_all_urdf_files_in_a_folder_and_its_subfolders(tmp_path: 
     assert "no URDF found" in refused("validate", str(tmp_path / "empty"))
 
 
+def test_an_empty_name_is_not_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.urdf").write_text(catalogue()["planar_two_link"].path.read_text("utf-8"))
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin("validate", "", "--samples", "1")
+    assert done.code == 2
+    assert "the robot's name is empty" in done.text
+
+
+def test_a_robot_from_standard_input_is_locked_once_if_its_accuracy_is_studied(tmp_path: Path) -> None:
+    path = tmp_path / "r.json"
+    urdf = catalogue()["planar_two_link"].path.read_text("utf-8")
+    options = ["--samples", "1", "--accuracy", "--accuracy-samples", "1", "--json", str(path)]
+    for lock, code in (("joint_1=0.5", 0), ("nowhere=0.5", 2)):
+        done = running.urdfkin("validate", "-", *options, "--lock", lock, stdin=urdf)
+        robot = json.loads(path.read_text())["robots"][0]
+        assert done.code == code, done.text
+        assert robot["source"] == "-"
+        assert (robot["accuracy"] is not None) == (code == 0)
+
+
 def test_a_report_rendered_later_equals_the_report_of_validate(tmp_path: Path) -> None:
     data, made = tmp_path / "a.json", []
     for words in (("validate", "planar_two_link", "--samples", "3", "--json", data), ("report", data)):
