@@ -145,7 +145,9 @@ def validate(
         stored_answers = None
         if folder is not None:
             manifest = Manifest.of(robot_inputs, samples, seed, started.isoformat(timespec="seconds"))
-            context = open_store(folder, manifest, _warn, shard=shard, retry=None if retry is None else chunks)
+            context = open_store(
+                folder, manifest, _warn, shard=shard, retry=None if retry is None else chunks
+            )
             stored_answers = stack.enter_context(context)
         try:
             if stored_answers is not None:

@@ -363,9 +363,7 @@ def open_store(
             shutil.rmtree(scratch, ignore_errors=True)  # A killed process leaves unfinished files.
             scratch.mkdir(parents=True)
             try:
-                store = _check_or_write_manifest(
-                    Store(folder, manifest, notify, scratch), retry
-                )
+                store = _check_or_write_manifest(Store(folder, manifest, notify, scratch), retry)
                 store.check_names()
                 yield store
             finally:
