@@ -51,7 +51,9 @@ def test_a_base_in_the_archive_is_used_and_missing_derivatives_are_computed(
     words = ["imu ur5 --frame tool0 --format json --trajectory", str(path)]
     q, v, a = (motion[x] for x in "qva")
     expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
-    assert urdfkin(*words).data["result"] == expected.tolist()
+    data = urdfkin(*words).data
+    assert data["result"] == expected.tolist()
+    assert {name: data[name] for name in fields} == {name: array.tolist() for name, array in fields.items()}
     np.savez(path, q=motion["q"])
     assert "rates by central differences" in good(*words).err
 
@@ -87,6 +89,11 @@ def test_a_wrong_archive_is_refused_in_one_line(
     assert words in err
     assert str(path) in err
     assert err.count("\n") == 1
+
+
+def test_the_json_of_an_imu_states_the_gravity() -> None:
+    words = "imu ur5 --format json --gravity=0,0,"
+    assert [good(words + z).data["gravity"] for z in ("-9.81", "-1.62")] == [[0, 0, -9.81], [0, 0, -1.62]]
 
 
 def test_an_incomplete_gravity_vector_is_refused() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -111,6 +111,8 @@ def _read_trajectory(
     if x.base is not None:
         reject_unused_options(context, _BASE_MOTION_OPTION_NAMES, "along a --trajectory with a moving base")
     settings = lock_settings(robot)
+    if x.base is not None:
+        settings |= {f"base_{name}": value.tolist() for name, value in asdict(x.base).items()}
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
         motion = complete_rates(robot.tree, x)
@@ -516,7 +518,8 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     x = _read_options()
     g = parse_numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with report_compilation():
-        return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
+        result = x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base)
+    return _answer(x.with_settings(gravity=g), IMU, result)
 
 
 @click.command(
