@@ -48,6 +48,18 @@ def test_a_line_without_a_positive_duration_or_enough_samples_is_refused(
         make_line_trajectory(robot, robot.neutral(), END, duration, samples)
 
 
+@pytest.mark.parametrize("duration", [1e-160, 5e-324])
+def test_a_line_with_infinite_accelerations_is_refused(robot: Robot, duration: float) -> None:
+    with pytest.raises(InputError, match="the duration is too short: v or a is not finite"):
+        make_line_trajectory(robot, robot.neutral(), END, duration, 10)
+
+
+def test_a_line_may_take_the_largest_duration(robot: Robot) -> None:
+    x = make_line_trajectory(robot, robot.neutral(), END, 1e308, 3)
+    assert x.t[-1] == 1e308
+    assert not x.a.any()
+
+
 @pytest.mark.parametrize("root", ["floating", "planar"])
 def test_velocities_on_a_line_of_a_floating_base_are_derivatives_of_frame_positions(root: str) -> None:
     robot = urdfkin.load("a1", root_joint=root, verify=False)

@@ -202,8 +202,8 @@ def make_line_trajectory(
     in seconds. `samples` is the number of samples, including the first and the last sample.
 
     Raises:
-        InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length;
-            or a number is not finite.
+        InputError: the duration is not above 0 s, or so short that v or a is not finite; `samples` is below
+            3; a configuration has a wrong length; or a number is not finite.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)
@@ -216,8 +216,15 @@ def make_line_trajectory(
     t = np.linspace(0.0, duration, samples)
     u = (t / duration)[:, np.newaxis]
     s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
-    s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
-    s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        s_1 = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+        s_2 = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / np.float64(duration) ** 2
+    if not (np.isfinite(s_1).all() and np.isfinite(s_2).all()):
+        raise InputError(
+            "the duration is too short: v or a is not finite",
+            found=f"{duration} s",
+            remedy="give a longer duration",
+        )
     step = difference(robot.tree, q_0, q_1)
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
