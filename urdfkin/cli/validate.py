@@ -264,7 +264,8 @@ def validate_command(
         _cluster(scheduler) as executor,
         progress(as_json=json_progress) as tell,
     ):
-        report = validate(given, executor=executor, progress=tell, **options, **how)
+        watched = stop.interrupting(tell)
+        report = validate(given, executor=executor, progress=watched, **options, **how)
         if with_study and not report.interrupted:
             settings = StudySettings(accuracy_samples, options["seed"], accuracy_moving_base)
             retries = retry is not None
