@@ -58,8 +58,12 @@ def test_the_accuracy_study_reports_a_moving_base_only_if_requested(tmp_path: Pa
     words = "validate", "polar", "--samples", "1", "--accuracy", "--accuracy-samples", "1", "--json", data
     still = urdfkin(*words)
     before = json.loads(data.read_text())["robots"][0]["accuracy"]
+    assert json.loads(data.read_text())["command"] == (
+        "urdfkin validate polar --samples 1 --seed 0 --accuracy --accuracy-samples 1"
+    )
     moving = urdfkin(*words, "--accuracy-moving-base", "--html", page)
     after = json.loads(data.read_text())["robots"][0]["accuracy"]
+    assert json.loads(data.read_text())["command"].endswith(" --accuracy-samples 1 --accuracy-moving-base")
     assert (still.code, moving.code) == (0, 0)
     assert "1 sample on a moving base" in moving.text
     assert "moving base" not in still.text
