@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.running import python
+from tests.cli.running import python, urdfkin
 from urdfkin.cli.exit import Stop, handle_signals
+from urdfkin.validation import answer
+from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 pytestmark = pytest.mark.long
 
@@ -163,3 +165,26 @@ def test_only_the_first_signal_interrupts_and_the_handlers_are_restored() -> Non
     finally:
         for each, handler in zip((signal.SIGTERM, signal.SIGHUP), before, strict=True):
             signal.signal(each, handler)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_signal_in_a_destructor_stops_the_run_after_the_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Dying:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGTERM)  # Python ignores the KeyboardInterrupt of the handler.
+
+    def run(chunk: Chunk) -> ChunkResult:
+        chunks.append(chunk)
+        Dying()
+        return run_chunk(chunk)
+
+    chunks: list[Chunk] = []
+    monkeypatch.setattr(answer, "run_chunk", run)
+    before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP)]
+    try:
+        done = urdfkin("validate planar_two_link --samples 200")
+    finally:
+        for each, handler in zip((signal.SIGTERM, signal.SIGHUP), before, strict=True):
+            signal.signal(each, handler)
+    assert (done.code, len(chunks)) == (143, 1)
+    assert "interrupted: 28 of 203 samples" in done.text

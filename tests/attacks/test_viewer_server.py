@@ -94,6 +94,17 @@ def test_the_page_and_a_connection_need_the_key_and_the_own_origin(server: Any) 
         assert connect(server, Origin=origin) == 403, origin
 
 
+def test_a_path_with_bytes_that_are_not_ascii_is_refused_with_the_security_headers(server: Any) -> None:
+    own = f"{LOOPBACK}:{server.get_port()}".encode()
+    with socket.create_connection((LOOPBACK, server.get_port()), timeout=20) as connection:
+        connection.sendall(b"GET /\xff HTTP/1.1\r\nHost: " + own + b"\r\n\r\n")
+        answer = http.client.HTTPResponse(connection)
+        answer.begin()
+        assert answer.status == 403
+        assert answer.getheader("X-Frame-Options") == "DENY"
+        answer.close()
+
+
 def test_a_request_with_a_foreign_host_name_is_refused(server: Any) -> None:
     port = server.get_port()
     for host in (f"localhost:{port}", f"[::1]:{port}", "127.0.0.1:9000", "127.0.0.2"):

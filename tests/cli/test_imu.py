@@ -103,6 +103,11 @@ def test_a_wrong_archive_is_refused_in_one_line(
     assert err.count("\n") == 1
 
 
+def test_the_json_of_an_imu_states_the_gravity() -> None:
+    words = "imu ur5 --format json --gravity=0,0,"
+    assert [good(words + z).data["gravity"] for z in ("-9.81", "-1.62")] == [[0, 0, -9.81], [0, 0, -1.62]]
+
+
 def test_an_incomplete_gravity_vector_is_refused() -> None:
     assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
 

@@ -58,8 +58,12 @@ def test_the_accuracy_study_reports_a_moving_base_only_if_requested(tmp_path: Pa
     words = "validate", "polar", "--samples", "1", "--accuracy", "--accuracy-samples", "1", "--json", data
     still = urdfkin(*words)
     before = json.loads(data.read_text())["robots"][0]["accuracy"]
+    assert json.loads(data.read_text())["command"] == (
+        "urdfkin validate polar --samples 1 --seed 0 --accuracy --accuracy-samples 1"
+    )
     moving = urdfkin(*words, "--accuracy-moving-base", "--html", page)
     after = json.loads(data.read_text())["robots"][0]["accuracy"]
+    assert json.loads(data.read_text())["command"].endswith(" --accuracy-samples 1 --accuracy-moving-base")
     assert (still.code, moving.code) == (0, 0)
     assert "1 sample on a moving base" in moving.text
     assert "moving base" not in still.text
@@ -80,6 +84,26 @@ def test_validate_reads_all_urdf_files_in_a_folder_and_its_subfolders(tmp_path: 
     assert "inside/b.urdf" in text
     (tmp_path / "empty").mkdir()
     assert "no URDF found" in refused("validate", str(tmp_path / "empty"))
+
+
+def test_an_empty_name_is_not_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.urdf").write_text(catalogue()["planar_two_link"].path.read_text("utf-8"))
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin("validate", "", "--samples", "1")
+    assert done.code == 2
+    assert "the robot's name is empty" in done.text
+
+
+def test_a_robot_from_standard_input_is_locked_once_if_its_accuracy_is_studied(tmp_path: Path) -> None:
+    path = tmp_path / "r.json"
+    urdf = catalogue()["planar_two_link"].path.read_text("utf-8")
+    options = ["--samples", "1", "--accuracy", "--accuracy-samples", "1", "--json", str(path)]
+    for lock, code in (("joint_1=0.5", 0), ("nowhere=0.5", 2)):
+        done = running.urdfkin("validate", "-", *options, "--lock", lock, stdin=urdf)
+        robot = json.loads(path.read_text())["robots"][0]
+        assert done.code == code, done.text
+        assert robot["source"] == "-"
+        assert (robot["accuracy"] is not None) == (code == 0)
 
 
 def test_a_report_rendered_later_equals_the_report_of_validate(tmp_path: Path) -> None:

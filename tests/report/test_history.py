@@ -124,6 +124,16 @@ def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> No
     assert "file: panda → robots/panda.urdf" in page
 
 
+def test_a_renamed_file_does_not_replace_the_history_of_an_earlier_file(tmp_path: Path) -> None:
+    runs = [run_on(day, arms()) for day in (1, 2, 3)]
+    for report in runs[1:]:
+        report |= {"robots": report["robots"][1:], "sha256": report["sha256"][1:], "robots_requested": 1}
+    runs[2]["robots"][0]["source"] = "panda"  # The file ur5 gets the name of the removed file panda.
+    found = read_history([saved(tmp_path / f"{i}.json", report) for i, report in enumerate(runs)])
+    marks = {name: verdict_marks(found, points) for name, points in found.robots.items()}
+    assert marks == {"panda": "✓·✓", "ur5": "✓✓·"}
+
+
 @pytest.mark.slow
 def test_a_store_counts_as_a_run_in_the_history(tmp_path: Path) -> None:
     validate("planar_two_link", samples=2, store=tmp_path / "nightly" / "store")

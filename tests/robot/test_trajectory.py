@@ -63,6 +63,12 @@ def test_a_line_has_finite_velocities_or_is_refused(robot: Robot, duration: floa
         make_line_trajectory(robot, robot.neutral(), END, 1e-160, 5)
 
 
+def test_a_line_may_take_the_largest_duration(robot: Robot) -> None:
+    x = make_line_trajectory(robot, robot.neutral(), END, 1e308, 3)
+    assert x.t[-1] == 1e308
+    assert not x.a.any()
+
+
 @pytest.mark.parametrize("root", ["floating", "planar"])
 def test_velocities_on_a_line_of_a_floating_base_are_derivatives_of_frame_positions(root: str) -> None:
     robot = urdfkin.load("a1", root_joint=root, verify=False)

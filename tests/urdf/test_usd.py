@@ -429,6 +429,15 @@ def test_a_variant_is_selected(write: Write) -> None:
     assert "5.0" in found.text
 
 
+def test_validate_locks_the_joints_of_a_variant_once(write: Write) -> None:
+    words = ("validate", str(write(variants())), "--variant", "gripper=long", "--samples", "1")
+    name = loaded(words[1]).joint_names[0]
+    assert good(*words, "--lock", f"{name}=0").code == 0
+    done = command(*words, "--lock", "nowhere=0")
+    assert done.code == 2
+    assert f"{words[1]}: bad input: lock: unknown coordinate 'nowhere'" in " ".join(done.text.split())
+
+
 ARCS = ("references", "payload", "instanceable = true\n    references")
 #: Unit and up axis in the head of a stage, and a head with this content only.
 UNITS = '    metersPerUnit = 1\n    upAxis = "Z"\n'

@@ -131,6 +131,17 @@ def test_a_damaged_result_is_reported_and_computed_again(study: Recorder, tmp_pa
         assert read_stored_report(tmp_path).studies == ()
 
 
+def test_status_and_merge_report_a_missing_result_of_the_study(study: Recorder, tmp_path: Path) -> None:
+    store, whole = str(tmp_path / "store"), str(tmp_path / "whole")
+    urdfkin("validate", *STUDIED, *COMMAND[4:], "--store", store)
+    assert urdfkin("report status", store).code == 0
+    next((tmp_path / "store").glob("chunks/*/*.accuracy")).unlink()
+    status = urdfkin("report status", store)
+    assert status.code == 3
+    assert "accuracy study: 1 of 2 robots done\nno process uses the store; to resume" in status.text
+    assert f"{whole}: 1 result of the accuracy study missing" in urdfkin("report merge", whole, store).text
+
+
 def test_a_failed_study_is_reported_each_time_and_retried_on_request(study: Recorder, tmp_path: Path) -> None:
     study.failing = "planar_two_link"
     command = (*COMMAND, "--store", str(tmp_path))

@@ -5,8 +5,10 @@ import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
+from xml.etree import ElementTree
 
 import numpy as np
+import pinocchio
 import pytest
 
 import urdfkin
@@ -18,6 +20,7 @@ from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_of
 from urdfkin.dh import make_dh_table
 from urdfkin.robot import Robot
+from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation import robot_summary
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Timings
@@ -165,3 +168,31 @@ def test_the_command_of_a_report_repeats_the_run_with_a_line_for_each_set_of_opt
         [robot["checks"][0]["worst"] for robot in each["robots"]] for each in (first.as_dict(), again)
     )
     assert worst == worst_again
+
+
+def test_validate_accepts_every_kind_of_source_that_load_accepts() -> None:
+    path = str(catalogue()["planar_two_link"].path)
+    screws = urdfkin.load("ur5").screws("tool0", "base")
+    sources = [pinocchio.buildModelFromUrdf(path), ElementTree.parse(path), screws]
+    for source in sources:
+        report = validate([source], samples=1).robots[0]
+        assert report.verdict == "verified", report.reason
+        assert len(report.joints) == len(urdfkin.load(source).joint_names)
+
+
+def test_a_loaded_robot_with_other_options_is_not_validated() -> None:
+    for source in ("ur5", catalogue()["planar_two_link"].path):
+        robot = urdfkin.load(source)
+        for options in ({"root_joint": "floating"}, {"mimic": False}):
+            report = validate([robot, "ur5"], samples=1, **options)
+            assert [one.verdict for one in report.robots] == ["bad input", "verified"]
+            assert f"`{next(iter(options))}` has no effect on a loaded robot" in str(report.robots[0].reason)
+        assert validate(urdfkin.load(source, root_joint="planar"), samples=1, root_joint="planar").passed
+        assert validate(robot, samples=1, mimic=True).passed
+
+
+def test_a_robot_with_a_second_oracle_is_compared_with_it_in_a_validation() -> None:
+    pytest.importorskip("mujoco")
+    for source in ("planar_two_link", str(catalogue()["planar_two_link"].path)):
+        report = validate(urdfkin.load(source, oracle="mujoco"), samples=1)
+        assert all(stats.cross_check for stats in report.robots[0].stats_of("placement"))

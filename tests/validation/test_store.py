@@ -176,6 +176,28 @@ def test_a_failed_robot_is_retried_on_request_with_a_changed_text(tmp_path: Path
         validate(robots, samples=0, store=store, retry="failed")
 
 
+def test_a_shard_that_retries_keeps_the_failures_of_other_shards(tmp_path: Path) -> None:
+    robots = ["planar_two_link", "no such robot"]
+    for shard in ("1/2", "2/2"):
+        validate(robots, samples=SAMPLES, store=tmp_path, shard=shard)
+    validate(robots, samples=SAMPLES, store=tmp_path, shard="1/2", retry="failed")
+    report = read_stored_report(tmp_path)
+    assert not report.interrupted
+    assert report.robots[1].verdict == ValidationVerdict.BAD_INPUT
+
+
+def test_a_shard_that_retries_deletes_all_failures_of_a_changed_file(tmp_path: Path) -> None:
+    robots, store = [str(tmp_path / "bad.urdf")], tmp_path / "store"
+    Path(robots[0]).write_text("<robot/>")
+    for shard in ("1/2", "2/2"):
+        validate(robots, samples=60, store=store, shard=shard)
+    robot_file(tmp_path / "bad.urdf", "mended")
+    for shard in ("1/2", "2/2"):
+        validate(robots, samples=60, store=store, shard=shard, retry="failed")
+    assert read_stored_report(store).passed
+    assert not (store / "damaged").exists()
+
+
 def test_a_failure_of_the_executor_is_not_stored_as_a_failure_of_the_robot(
     undisturbed: str, tmp_path: Path
 ) -> None:

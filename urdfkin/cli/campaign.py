@@ -171,7 +171,7 @@ def status(context: click.Context, folder: Path) -> None:
     folder, so it is fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all
     files.
 
-    Exit 0: complete. 3: results are missing, or a robot failed.
+    Exit 0: complete. 3: results are missing, also of the accuracy study, or a robot failed.
     """
     from urdfkin.validation.store import Store
 
@@ -186,7 +186,7 @@ def status(context: click.Context, folder: Path) -> None:
     say(f"{folder}: {samples}, started {manifest.started}")
     say(f"robots: {over:,} of {len(counts):,} done, {len(failed):,} of them failed")
     say(f"chunks: {finished:,} done, {missing:,} missing")
-    _print_accuracy_progress(store, counts)
+    missing_studies = _print_accuracy_progress(store, counts)
     for robot in failed[:_MAX_FAILED]:
         say(f"  failed: {manifest.robots[robot][0].command_line}{_failure_reason(store, robot)}")
     if len(failed) > _MAX_FAILED:
@@ -198,11 +198,11 @@ def status(context: click.Context, folder: Path) -> None:
         )
     if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
-    elif missing:
+    elif missing or missing_studies:
         say("no process uses the store; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
         say("to validate the failed robots again, add `--retry failed` to the `urdfkin validate` command")
-    context.exit(3 if missing or failed else 0)
+    context.exit(3 if missing or missing_studies or failed else 0)
 
 
 def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
@@ -210,12 +210,16 @@ def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
     return sum(size - done for done, has_failed in counts.values() if not has_failed)
 
 
-def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
+def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
+    """Print the progress of the accuracy study, and return the number of missing results."""
     from urdfkin.validation.store import AccuracyStore
 
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
-    if (results := AccuracyStore.from_store(store)) is not None:
-        say(f"accuracy study: {sum(map(results.has, robots)):,} of {format_count(len(robots), 'robot')} done")
+    if (results := AccuracyStore.from_store(store)) is None:
+        return 0
+    done = sum(map(results.has, robots))
+    say(f"accuracy study: {done:,} of {format_count(len(robots), 'robot')} done")
+    return len(robots) - done
 
 
 def _failure_reason(store: Store, robot: int) -> str:
@@ -263,8 +267,10 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
         AccuracyStore.merge(whole, others)
         counts = whole.count_chunks()
         missing = _missing_chunks(whole, counts)
-        _print_accuracy_progress(whole, counts)
-    say(f"{folder}: complete" if not missing else f"{folder}: {format_count(missing, 'chunk')} missing")
+        missing_studies = _print_accuracy_progress(whole, counts)
+    parts = [format_count(missing, "chunk")] if missing else []
+    parts += [format_count(missing_studies, "result") + " of the accuracy study"] if missing_studies else []
+    say(f"{folder}: {' and '.join(parts)} missing" if parts else f"{folder}: complete")
 
 
 def warn(message: str) -> None:

@@ -157,8 +157,8 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     like = None
     if request.like is not None:
         like = read_table(reference_path(request.like))
-        tip = tip or _frame_of_robot(request, like.tip_frame)
-        base = base or _frame_of_robot(request, like.base_frame)
+        tip = _frame_of_robot(request, like.tip_frame) if tip is None else tip
+        base = _frame_of_robot(request, like.base_frame) if base is None else base
     if base is None and request.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     convention = request.convention or (like.convention if like else "standard")
@@ -229,8 +229,9 @@ def _make_comparison_answer(request: DHRequest, name: str) -> Answer:
     _require_format(request, "--compare", (*_DOCUMENT_FORMATS, "json"))
     path = reference_path(name)
     data = read_mapping(path)
-    tip = request.tip or _frame_of_robot(request, data.get("tip_frame"))
-    base = request.base or _frame_of_robot(request, data.get("base_frame"))
+    tip, base = request.tip, request.base
+    tip = _frame_of_robot(request, data.get("tip_frame")) if tip is None else tip
+    base = _frame_of_robot(request, data.get("base_frame")) if base is None else base
     chain, tolerance = request.robot.chain(tip, base), request.tolerance / 1e3
     notes: list[str] = []
     if "convention" not in data:

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import signal
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -23,6 +23,9 @@ from urdfkin.errors import UrdfkinError
 
 #: SIGTERM comes from `kill`, a scheduler or a shutdown. SIGHUP comes from a closing terminal.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+
+
+_T = TypeVar("_T")
 
 
 @dataclass(slots=True)
@@ -35,6 +38,19 @@ class Stop:
         A signal does not change the exit code 1, which reports a disagreement.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
+
+    def interrupting(self, function: Callable[[_T], None]) -> Callable[[_T], None]:
+        """Return `function` with a check for a signal, which raises KeyboardInterrupt.
+
+        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
+        """
+
+        def call(argument: _T) -> None:
+            if self.signal is not None:
+                raise KeyboardInterrupt
+            function(argument)
+
+        return call
 
 
 @contextmanager

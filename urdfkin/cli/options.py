@@ -597,12 +597,12 @@ def with_base_motion(
 
     if placement is None and velocity is None and acceleration is None:
         return x
-    still = "0,0,0,0,0,0"
-    T = _placements(
-        *_read_rows(placement or still, "--base-placement", (_RPY_POSE_NAMES, _QUATERNION_POSE_NAMES))
+    placement, velocity, acceleration = (
+        "0,0,0,0,0,0" if text is None else text for text in (placement, velocity, acceleration)
     )
-    v, _ = _read_rows(velocity or still, "--base-velocity", (_SIX_VECTOR_NAMES,))
-    a, _ = _read_rows(acceleration or still, "--base-acceleration", (_SIX_VECTOR_NAMES,))
+    T = _placements(*_read_rows(placement, "--base-placement", (_RPY_POSE_NAMES, _QUATERNION_POSE_NAMES)))
+    v, _ = _read_rows(velocity, "--base-velocity", (_SIX_VECTOR_NAMES,))
+    a, _ = _read_rows(acceleration, "--base-acceleration", (_SIX_VECTOR_NAMES,))
     problem = "the batches of q, v, a and the base motion have different lengths"
     q, v_, a_, *base = _repeat_single(problem, [x.q, x.v, x.a, T, v, a])
     names = "base_placement", "base_velocity", "base_acceleration"

@@ -518,7 +518,8 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     x = _read_options()
     g = parse_numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with report_compilation():
-        return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
+        result = x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base)
+    return _answer(x.with_settings(gravity=g), IMU, result)
 
 
 @click.command(

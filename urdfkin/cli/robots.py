@@ -140,7 +140,8 @@ def order_command(robot: str, start: str | None, end: str | None) -> Answer:
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
         return _orders(loaded)
-    return _conversion_code(loaded, start or "urdfkin", end or "urdfkin")
+    names = ("urdfkin" if name is None else name for name in (start, end))
+    return _conversion_code(loaded, *names)
 
 
 def _orders(robot: Robot) -> Answer:

@@ -227,6 +227,8 @@ def validate_command(
     store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
         raise click.UsageError("give either robots, or --all (every robot of example-robot-data)")
+    if robots.count("-") > 1:
+        raise click.UsageError("only one of the robots can come from standard input")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard need --store DIR")
     if scheduler and (options["jobs"] > 1 or options["isolate"]):
@@ -240,7 +242,7 @@ def validate_command(
             "--shard cannot be combined with a report file; run `urdfkin report merge`, then `urdfkin report`"
         )
     from urdfkin.report.terminal import print_report
-    from urdfkin.urdf.sources import is_xacro
+    from urdfkin.urdf.sources import is_usd, is_xacro
     from urdfkin.validation.campaign import validate
     from urdfkin.validation.store import StudySettings
 
@@ -249,6 +251,8 @@ def validate_command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
+    if not any(map(is_usd, robots)):
+        reject_unused_options(context, ("variant", "articulation"), "without a USD file")
     sources = [source for robot in robots for source in _list_urdf_files(robot)] or list(
         example_robot_data_names()
     )
@@ -260,7 +264,8 @@ def validate_command(
         _cluster(scheduler) as executor,
         progress(as_json=json_progress) as tell,
     ):
-        report = validate(given, executor=executor, progress=tell, **options, **how)
+        watched = stop.interrupting(tell)
+        report = validate(given, executor=executor, progress=watched, **options, **how)
         if with_study and not report.interrupted:
             settings = StudySettings(accuracy_samples, options["seed"], accuracy_moving_base)
             retries = retry is not None
@@ -294,25 +299,30 @@ def _list_urdf_files(robot: str) -> list[str]:
     """Return `robot`; if `robot` is a folder, return the .urdf files in it and its subfolders."""
     from urdfkin.urdf.lint.settings import DEFAULT_INCLUDE, Settings, find_files
 
-    if robot in catalogue() or not is_folder(Path(robot)):
+    if not robot or robot in catalogue() or not is_folder(Path(robot)):
         return [robot]
     return find_files(robot, Settings(), DEFAULT_INCLUDE, ())
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load the robot now if `source` is standard input, which can be read only once."""
+    """Load the robot now if `source` is standard input, which can be read only once.
+
+    The robot has no locked joint, because `validate` and the accuracy study lock the joints.
+    """
     from urdfkin.robot.loading import load
 
-    return load(source, **how) if source == "-" else source
+    loading = {name: value for name, value in how.items() if name not in ("lock", "joints")}
+    return load(source, **loading) if source == "-" else source
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
+    """Load the robot now if `source` is a USD file. As in `_load_stdin`, the robot has no locked joint."""
     from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
     if not isinstance(source, str) or not is_usd(source):
         return source
-    return load_robot(str(source), **loading, **usd)
+    return load_robot(source, **loading, **usd, lock={}, joints=None)
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:

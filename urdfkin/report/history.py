@@ -279,10 +279,14 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
 
 
 def _add_robots(history: History, before: Document | None, document: Document) -> None:
-    """Add the robots of the latest run; the history of a renamed file continues under the new name."""
+    """Add the robots of the latest run; the history of a renamed file continues under the new name.
+
+    If the new name already has a history, this history continues.
+    """
     robots = robots_by_source(document)
     for old, new in find_renamed_files(robots_by_source(before) if before else {}, robots).items():
-        history.robots[new] = history.robots.pop(old)
+        if new not in history.robots:
+            history.robots[new] = history.robots.pop(old)
     for source, robot in robots.items():
         history.robots.setdefault(source, []).append(_point(len(history.runs) - 1, source, robot))
 

@@ -30,7 +30,7 @@ from urdfkin.validation.collector import Progress, ResultCollector
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.results import RobotReport, ValidationReport
-from urdfkin.validation.robot_input import RobotInput, RobotSource, make_robot_inputs
+from urdfkin.validation.robot_input import RobotInput, make_robot_inputs
 from urdfkin.validation.store import AccuracyStore, FailedStudy, Manifest, Store, open_store
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.comparison import load_kernels
@@ -39,6 +39,7 @@ from urdfkin.verify.pinocchio import pinocchio
 
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import AccuracyStudy
+    from urdfkin.validation.robot_input import RobotSource
 
 
 class StoreWarning(UserWarning):
@@ -80,8 +81,8 @@ def validate(
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
         jobs: Number of local processes; 1: this process. If one of several processes crashes, its robot is
             tried once more, alone in a process. Other robots are not affected.
-        mimic: As in `load`.
-        root_joint: As in `load`.
+        mimic: As in `load`. A loaded robot with another value is reported with an error.
+        root_joint: As in `load`. A loaded robot with another value is reported with an error.
         xacro_args: Arguments for the .xacro files among the robots, as in `load`.
         lock: The joints to lock, each with a value in rad or m, as in `load`. The joints are locked in every
             robot.
@@ -135,9 +136,8 @@ def validate(
     if oracle_library(oracle) is not PINOCCHIO:
         robot_inputs = [replace(x, origin=replace(x.origin, oracle=oracle)) for x in robot_inputs]
     chunking = Chunking(samples)
-    collector = ResultCollector(
-        robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
-    )
+    chunks = chunks_of_shard(len(robot_inputs), chunking, shard)
+    collector = ResultCollector(robot_inputs, chunking, chunks, progress)
     # The machines of an executor compute their own memory limits.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
@@ -146,7 +146,9 @@ def validate(
         stored_answers = None
         if folder is not None:
             manifest = Manifest.of(robot_inputs, samples, seed, started.isoformat(timespec="seconds"))
-            context = open_store(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            context = open_store(
+                folder, manifest, _warn, shard=shard, retry=None if retry is None else chunks
+            )
             stored_answers = stack.enter_context(context)
         try:
             if stored_answers is not None:

@@ -217,11 +217,20 @@ class ValidationReport(Displayable):
 
         Robots with the same options share a command. A command can read only one robot from standard input.
         """
-        settings = f"--samples {self.samples} --seed {self.seed}"
+        settings = f"--samples {self.samples} --seed {self.seed}{self._accuracy_options}"
         return "\n".join(
             f"urdfkin validate {_join_sources(origins)} {settings} {origins[0].command_line_options}".rstrip()
             for origins in _group_by_command([robot.origin for robot in self.robots])
         )
+
+    @property
+    def _accuracy_options(self) -> str:
+        if not self.studies:
+            return ""
+        if (study := next(filter(None, self.studies), None)) is None:
+            return " --accuracy"
+        moving = " --accuracy-moving-base" if study.moving_base else ""
+        return f" --accuracy --accuracy-samples {study.samples}{moving}"
 
     @property
     def outcome(self) -> RunOutcome:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING, cast
 
 from numpy.typing import ArrayLike
 
@@ -21,13 +22,19 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, OracleError, UrdfkinError
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load, make_robot
-from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.catalogue import catalogue, find_description
 from urdfkin.urdf.lint import Finding, UrdfWarning
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import Origin, Source, UrdfText, is_usd, is_xacro, read_source, unambiguous_path
 from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
-RobotSource = Source | DHTable | Robot
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from urdfkin.dh.screws import ProductOfExponentials
+    from urdfkin.urdf.foreign import XmlElement, XmlTree
+
+    RobotSource = Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree | Robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +58,8 @@ class RobotInput:
     def of(cls, robot: Robot) -> RobotInput:
         if robot.source in catalogue():
             robot_input = _from_path_or_name(robot.source, robot.origin.mimic, robot.origin.root_joint)
-            return replace(robot_input, origin=replace(robot_input.origin, lock=robot.origin.lock))
+            own = replace(robot_input.origin, lock=robot.origin.lock, oracle=robot.origin.oracle)
+            return replace(robot_input, origin=own)
         source_findings = tuple(
             finding for finding in robot.findings if finding.code.startswith(("MJCF", "USD"))
         )
@@ -120,7 +128,8 @@ def make_robot_inputs(
                 name = unambiguous_path(Path(robot))
             else:
                 name = robot if isinstance(robot, str) else f"<{type(robot).__name__}>"
-            robot_inputs.append(RobotInput(b"", Origin(name, mimic, root_joint)))
+            origin = robot.origin if isinstance(robot, Robot) else Origin(name, mimic, root_joint)
+            robot_inputs.append(RobotInput(b"", origin))
             errors[i] = error
     return robot_inputs, errors
 
@@ -142,22 +151,45 @@ def make_robot_input(
 def _make_robot_input(
     robot: RobotSource, mimic: bool | None, root_joint: str | None, xacro_args: Mapping[str, object] | None
 ) -> RobotInput:
-    if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
+    if isinstance(robot, Robot):
+        _reject_other_options(robot, mimic, root_joint)
+        return RobotInput.of(robot)
+    if is_table_file(robot) or is_mjcf(robot) or is_usd(robot) or _is_object(robot):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
             return RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint))
-    if isinstance(robot, Robot):
-        return RobotInput.of(robot)
     if is_xacro(robot):
         text = read_source(robot, xacro_args=xacro_args)  # The .xacro file is expanded only once.
         return _from_text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
     source = unambiguous_path(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
         return _from_path_or_name(source, mimic, root_joint)
-    text = read_source(source)  # An open file, or standard input, can be read only once.
+    text = read_source(cast("Source", source))  # An open file, or standard input, can be read only once.
     if is_mjcf(text.data):
         return _make_robot_input(text.data, mimic, root_joint, None)
     return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)
+
+
+def _is_object(robot: RobotSource) -> bool:
+    """Return whether `robot` is an object of another library, a table, or in robot_descriptions."""
+    if isinstance(robot, str | bytes | os.PathLike) or hasattr(robot, "read"):
+        return find_description(robot) is not None
+    return True
+
+
+def _reject_other_options(robot: Robot, mimic: bool | None, root_joint: str | None) -> None:
+    """Raise InputError if an argument of `validate` contradicts a loaded robot."""
+    for name, value, own in (
+        ("mimic", mimic, robot.verifier.mimic),
+        ("root_joint", root_joint, robot.origin.root_joint),
+    ):
+        if value is not None and value != own:
+            raise InputError(
+                f"`{name}` has no effect on a loaded robot",
+                where=robot.source,
+                found=f"{name}={value!r}",
+                remedy=f"pass `{name}` to `load`",
+            )
 
 
 def _from_path_or_name(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:

@@ -208,9 +208,11 @@ class Store:
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
         self._write_atomically(self._path_of(key, kind), data)
 
-    def delete_failures(self) -> None:
-        for path in self._find_files(_FAILED):
-            path.unlink(missing_ok=True)
+    def delete_failures(self, chunks: Sequence[range]) -> None:
+        """Delete the stored failures of these chunks of each robot."""
+        for robot, indices in enumerate(chunks):
+            for index in indices:
+                self._path_of(self.manifest.key(robot, index), _FAILED).unlink(missing_ok=True)
 
     def check_names(self) -> None:
         """Report files with unknown names; a writable store moves them to `damaged/`.
@@ -325,7 +327,12 @@ def _make_remedy(error: OSError) -> str:
 
 @contextlib.contextmanager
 def open_store(
-    folder: Path, manifest: Manifest, notify: Notify, *, shard: str | None = None, retry_failed: bool = False
+    folder: Path,
+    manifest: Manifest,
+    notify: Notify,
+    *,
+    shard: str | None = None,
+    retry: Sequence[range] | None = None,
 ) -> Iterator[Store]:
     """Open or create the store of a validation, and lock it.
 
@@ -334,7 +341,8 @@ def open_store(
     | "2/4" | shared lock of the store, exclusive lock of the shard |
     | None | exclusive lock of the store |
 
-    `retry_failed` deletes stored failures, because the robots' files may differ now.
+    `retry` contains chunks of each robot. Their stored failures are deleted, because the robots' files may
+    differ now. Failures of other chunks belong to other shards, and remain.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -355,9 +363,7 @@ def open_store(
             shutil.rmtree(scratch, ignore_errors=True)  # A killed process leaves unfinished files.
             scratch.mkdir(parents=True)
             try:
-                store = _check_or_write_manifest(
-                    Store(folder, manifest, notify, scratch), retry_failed=retry_failed
-                )
+                store = _check_or_write_manifest(Store(folder, manifest, notify, scratch), retry)
                 store.check_names()
                 yield store
             finally:
@@ -375,13 +381,13 @@ def _is_store_entry(path: Path) -> bool:
     return path.name in (_SCRATCH_FOLDER, _CHUNKS) or path.name.startswith(_LOCK)
 
 
-def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
+def _check_or_write_manifest(store: Store, retry: Sequence[range] | None) -> Store:
     """Decide which manifest the store has.
 
     | case | result |
     |---|---|
     | The folder has no manifest. | Write the new manifest. |
-    | `retry_failed`; only the files of failed robots have changed. | Replace the old manifest. |
+    | `retry`; only the files of failed robots have changed. | Replace the old manifest. |
     | Any other case; both manifests agree. | Keep the old manifest with its start time. |
     | Any other case; the manifests differ. | Raise InputError. |
     """
@@ -389,11 +395,14 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
         store.write(_MANIFEST, store.manifest.as_json())
         return store
     before = replace(store, manifest=Store.open_read_only(store.folder, store.notify).manifest)
-    is_changed = retry_failed and _only_failed_robots_differ(before, store.manifest)
+    is_changed = retry is not None and _only_failed_robots_differ(before, store.manifest)
     if not is_changed:
         before.check_same_campaign(store.manifest)
-    if retry_failed:
-        before.delete_failures()
+    if retry is not None:
+        whole = range(len(store.manifest.chunking))
+        robots = zip(before.manifest.robots, store.manifest.robots, retry, strict=True)
+        # All failures of a changed file are outdated, also those of other shards.
+        before.delete_failures([chunks if old == new else whole for old, new, chunks in robots])
     if is_changed:
         store.write(_MANIFEST, store.manifest.as_json())
         return store

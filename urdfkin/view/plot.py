@@ -11,7 +11,7 @@ import numpy as np
 
 from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.compiled.plan import IntArray
-from urdfkin.errors import UnknownNameError
+from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration
@@ -262,6 +262,12 @@ def _select_panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -
             found.append(PANELS[name])
         else:
             raise UnknownNameError("panel", name, [*COORDINATE_PANELS, *PANELS])
+    if not found:
+        raise InputError(
+            "no panel to draw, because no joint of the robot moves",
+            found=", ".join(names),
+            remedy=f"choose other panels, such as {next(iter(PANELS))}",
+        )
     return found
 
 

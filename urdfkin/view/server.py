@@ -108,7 +108,9 @@ class RequestFilter:
         """
         if len(hosts) != 1 or not self._is_known(hosts[0]):
             return "the Host header of the request does not name this viewer"
-        if not hmac.compare_digest(path.partition("?")[0].strip("/").encode(), self.key.encode()):
+        # The library websockets decodes a byte that is not ASCII as a surrogate.
+        asked = path.partition("?")[0].strip("/").encode(errors="surrogateescape")
+        if not hmac.compare_digest(asked, self.key.encode()):
             return "open the whole address that `urdfkin view` printed, including its key"
         if origins != [f"http://{hosts[0]}"] and (connects or origins):
             return "another web page may not connect to this viewer"

@@ -40,6 +40,15 @@ def test_the_title_states_start_and_end_and_every_panel_is_available(case: Case,
         plot_motion(*case, ["velocty"])
 
 
+def test_panels_of_coordinates_without_a_moving_joint_are_refused() -> None:
+    robot = urdfkin.load('<robot name="a"><link name="l"/></robot>')
+    trajectory = make_line_trajectory(robot, [], [], 1.0, 3)
+    motion = frame_motion(robot, trajectory, "l")
+    assert plot_motion(robot, motion, trajectory).axes
+    with pytest.raises(InputError, match="no joint of the robot moves: found q, v; choose other panels"):
+        plot_motion(robot, motion, trajectory, ["q", "v"])
+
+
 def test_the_plotted_lines_have_the_values_of_the_motion(case: Case) -> None:
     robot, x, trajectory = case
     figure = plot_motion(robot, x, trajectory, ["velocity", "parts"])
