@@ -24,7 +24,7 @@ import numpy as np
 from urdfkin.dh.rows import LIMIT_KEYS, NumberWithText, table_from_mapping
 from urdfkin.dh.screws import ProductOfExponentials, screws_from_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, to_plain_text
+from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, parse_units, to_plain_text
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNIT_SHORT_NAMES
@@ -89,7 +89,9 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             data = names | data
     for end in ("base", "tool"):
         if end not in data and (pose := _parse_pose(end, grid.other_lines)):
-            data[end] = pose
+            # The printed pose is in metres, also if the table is in millimetres.
+            in_millimetres = parse_units(lengths=data.get("lengths", "metres")).uses_millimetres
+            data[end] = [[*row[:3], row[3] * 1e3 if in_millimetres else row[3]] for row in pose]
     data["rows"] = [_parse_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
     _replace_mimic_variables(data, _parse_coordinate_names(grid.other_lines))
     return data
@@ -333,11 +335,14 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             row[column.name] = _add_unit(cell, column, where, grid)
         elif column.name == "kind":
             row["kind"] = _KINDS_BY_SIGMA.get(cell, cell)
+        elif column.name in LIMIT_KEYS and column.unit:
+            row[column.name] = f"{cell} {column.unit}"
         else:
             row[column.name] = (
                 from_csv_cell(_unescape(cell)) if column.name in ("joint", "mimicked_joint") else cell
             )
-    return _nest_row(row)
+    units = {column.name: column.unit for column in grid.columns}
+    return _nest_row(row, units, f"row {index + 1}, offset")
 
 
 def _add_unit(original: str, column: _Column, where: str, grid: _Grid) -> str:
@@ -367,16 +372,31 @@ def _unescape(name: str) -> str:
     return re.sub(r"\\([_&%$#{}])", r"\1", name)
 
 
-def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
+def _nest_row(row: dict[str, Any], units: Mapping[str, str | None], where: str) -> dict[str, Any]:
     """Without a mimic rule, add the offset to theta or d."""
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("mimicked_joint", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
     limit = {key: row.pop(key) for key in LIMIT_KEYS if key in row}
     if "offset" in row:
-        name = "d" if str(row.get("kind", "R")).upper().startswith("P") else "theta"
-        row[name] = f"{row[name]} + {row.pop('offset')}".replace("+ -", "- ").replace("+ +", "+ ")
+        _add_offset(row, row.pop("offset"), units, where)
     return {**row, **({"mimic": mimic} if mimic else {}), **({"limit": limit} if limit else {})}
+
+
+def _add_offset(row: dict[str, Any], offset: str, units: Mapping[str, str | None], where: str) -> None:
+    slides = parse_cell(row["d"]).variable_factor is not None
+    name = "d" if str(row.get("kind", "P" if slides else "R")).upper().startswith("P") else "theta"
+    cell, added = parse_cell(row[name]), parse_cell(offset)
+    unit = added.unit or units[name]
+    if added.variable_factor is not None or (cell.number and added.number and cell.unit != unit):
+        raise InputError(
+            f"offset must be a number in the unit of {name}",
+            where=where,
+            found=f"{safe_repr(offset)}, and {safe_repr(row[name])} in {name}",
+            remedy="write both with the same unit",
+        )
+    offset = offset if added.unit else f"{offset} {unit or ''}"
+    row[name] = f"{row[name]} + {offset}".replace("+ -", "- ").replace("+ +", "+ ")
 
 
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:

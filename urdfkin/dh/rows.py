@@ -262,19 +262,27 @@ def _parse_cell_text(text: str, where: str) -> Cell:
         ) from None
 
 
+def _parse_quantity(
+    name: str, value: Any, is_length: bool, units: Units, where: str
+) -> tuple[float, Units, bool]:
+    """Return a number, its units, and whether the value states its own unit."""
+    if not isinstance(value, str):
+        return parse_number(value, where), units, False
+    cell = _parse_cell_text(value, where)
+    if cell.variable_factor is not None:
+        raise InputError(f"{name} must not contain a joint variable", where=where, found=repr(value))
+    if cell.unit is None:
+        return cell.number, units, False
+    if (cell.unit in ("m", "mm")) != is_length:
+        kind = "a length" if is_length else "an angle"
+        raise InputError(f"{name} must be {kind}", where=where, found=repr(value))
+    return cell.number, units_of_cell(cell, units), True
+
+
 def _parse_value(name: str, value: Any, units: Units, where: str) -> float:
-    is_length, at, unit = name in ("a", "d"), f"{where}, {name}", None
-    if isinstance(value, str):
-        cell = _parse_cell_text(value, at)
-        number, unit = cell.number, cell.unit
-        if unit is not None:
-            if (unit in ("m", "mm")) != is_length:
-                kind = "a length" if is_length else "an angle"
-                raise InputError(f"{name} must be {kind}", where=at, found=repr(value))
-            units = units_of_cell(cell, units)
-    else:
-        number = parse_number(value, at)
-    may_be_degrees = not is_length and unit is None and units.angles is AngleUnit.RADIANS
+    is_length, at = name in ("a", "d"), f"{where}, {name}"
+    number, units, has_unit = _parse_quantity(name, value, is_length, units, at)
+    may_be_degrees = not is_length and not has_unit and units.angles is AngleUnit.RADIANS
     if may_be_degrees and abs(number) > 2.0 * math.pi:
         raise InputError(
             f"{name} is more than one turn in radians",
@@ -310,8 +318,9 @@ def _parse_sense(value: Any, where: str) -> int:
 
 
 def _parse_joint_value(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    number = parse_number(value, f"{where}, {name}")
-    return convert_to_si("theta" if _parse_kind(fields.get("kind", "R"), where).turns else "d", number, units)
+    turns = _parse_kind(fields.get("kind", "R"), where).turns
+    number, units, _ = _parse_quantity(name, value, not turns, units, f"{where}, {name}")
+    return convert_to_si("theta" if turns else "d", number, units)
 
 
 def _parse_mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Mimic | None:
