@@ -80,7 +80,7 @@ def to_tree(table: DHTable) -> KinematicTree:
                 (JointKind.CONTINUOUS, None) if turns else (JointKind.PRISMATIC, DEFAULT_PRISMATIC_LIMIT)
             )
             joint = Joint(mimicked_joint, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
-            triples.append((joint, links[0], _make_unique(f"{mimicked_joint}_link", links)))
+            triples.append((joint, links[0], make_unique(f"{mimicked_joint}_link", links)))
     return build_tree(table.robot, links[0], triples)
 
 
@@ -109,7 +109,7 @@ def _serial_joints(
         Joint(row.joint, kind, 0, T, np.array([0.0, 0.0, float(row.sense)]), limit, mimic)
         for row, T, (kind, limit, mimic) in zip(table.rows, poses, details, strict=True)
     ]
-    name = _make_unique(f"{table.tip_frame}_fixed", [*(row.joint for row in table.rows), *table.joint_names])
+    name = make_unique(f"{table.tip_frame}_fixed", [*(row.joint for row in table.rows), *table.joint_names])
     return [*joints, Joint(name, JointKind.FIXED, 0, T_tip, np.array([1.0, 0.0, 0.0]))]
 
 
@@ -125,12 +125,18 @@ def relative_frame_poses(table: DHTable) -> list[FloatArray]:
 
 
 def link_names(table: DHTable) -> list[str]:
-    names = [table.base_frame]
-    names += [_make_unique(f"{row.joint}_link", [*names, table.tip_frame]) for row in table.rows]
-    return [*names, _make_unique(table.tip_frame, names)]
+    return make_link_names(table.base_frame, [row.joint for row in table.rows], table.tip_frame)
 
 
-def _make_unique(name: str, taken: list[str]) -> str:
+def make_link_names(base: str, joints: Sequence[str], tip: str) -> list[str]:
+    """Return different names of the links of a serial chain."""
+    names = [base]
+    for joint in joints:
+        names.append(make_unique(f"{joint}_link", [*names, tip]))
+    return [*names, make_unique(tip, names)]
+
+
+def make_unique(name: str, taken: list[str]) -> str:
     while name in taken:
         name += "_"
     return name

@@ -6,6 +6,7 @@ import codecs
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, cast
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_str, safe_repr
-from urdfkin.model.tree import with_named_poses, with_pinocchio_tilts
+from urdfkin.model.tree import LinkFrame, with_named_poses, with_pinocchio_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import expand_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
@@ -213,7 +214,9 @@ def _load_table(
     if as_verify(options["verify"]):
         verifier = _load_without_options(robot, text).verifier
         if isinstance(table, ProductOfExponentials):
-            check_screws(verifier, table)
+            links = verifier.tree.links
+            base, tip = LinkFrame.of(links[0]), LinkFrame.of(links[-1])
+            check_screws(verifier, replace(table, base_frame=base, tip_frame=tip))
         else:
             check_table_source(verifier, table)
     return robot

@@ -68,7 +68,7 @@ def compare(
 
     The table may have other base and tip frames than the path. The table's base (tip) frame must be fixed
     to the path's base (tip) link. `tolerance` (m) applies at the tip. With `fit`, base, tool, joint offsets
-    and signs are fitted first.
+    and signs are fitted first. Mimic rules are not compared: each joint moves independently.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)

@@ -27,6 +27,7 @@ from urdfkin.dh.export.code import (
     matrix_lines,
     sanitize,
 )
+from urdfkin.dh.export.data import format_toml_value
 from urdfkin.dh.export.text import latex_math, latex_pose, scale_to_fit
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.structure import axes_and_connecting_vectors
@@ -203,7 +204,9 @@ def _matlab(screws: ProductOfExponentials) -> str:
 
 
 _EXACT_FORMS: dict[str, Callable[[ProductOfExponentials], str]] = {
-    "toml": lambda screws: "".join(f"{key} = {json.dumps(x)}\n" for key, x in screws.as_mapping().items()),
+    "toml": lambda screws: "".join(
+        f"{key} = {format_toml_value(x)}\n" for key, x in screws.as_mapping().items()
+    ),
     "json": lambda screws: json.dumps(screws.as_mapping(), indent=2) + "\n",
     "numpy": _numpy,
     "matlab": _matlab,
