@@ -493,6 +493,23 @@ def test_units_apply_to_base_tool_limits_and_mimic_joints() -> None:
     assert (present(rule).multiplier, present(rule).offset) == (2.0, 0.01)
 
 
+@pytest.mark.parametrize("form", ["terminal", "markdown", "latex"])
+def test_a_printed_table_with_mimic_joints_and_misleading_names_is_read(form: str) -> None:
+    rows = [
+        {"a": 1, "joint": "one"},
+        {"a": 2, "joint": "two", "mimic": {"mimicked_joint": "one", "multiplier": -1}},
+        {"a": 3, "joint": "modified", "kind": "P"},
+    ]
+    names = {"robot": "my hand", "base_frame": "craig", "tip_frame": "proximal"}
+    table = table_from_rows(rows, "standard", **names)
+    again = table_from_text(
+        export(table, form), {"terminal": ".txt", "markdown": ".md", "latex": ".tex"}[form]
+    )
+    assert again.rows == table.rows
+    assert (again.convention, again.joint_names) == ("standard", ("one", "modified"))
+    assert {name: getattr(again, name) for name in names} == names
+
+
 def test_a_joint_variable_in_d_adds_the_offset_to_d() -> None:
     text = "convention: standard\n\na | alpha | d | theta | offset\n0 | 0 | q1 | 0 | 0.05\n"
     assert table_from_text(text, ".md").rows[0].cells == (0.0, 0.0, 0.05, 0.0, 0.0)

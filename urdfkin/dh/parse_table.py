@@ -59,8 +59,10 @@ _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
     "standard": r"\b(?:standard|classic(?:al)?|distal|paul(?:'s)?)\b",
 }
+#: The names and the convention in the title of a table that urdfkin prints.
 _TITLE = re.compile(
-    r"(?:^|parameters of )(?:\*\*)?(?P<robot>\S+?)(?:\*\*)?[:,] (?P<base>\S+) to (?P<tip>\S+?),"
+    r"^(?:.*\bparameters of )?(?:\*\*)?(?P<robot>.+?)(?:\*\*)?[:,] (?P<base>.+?) to (?P<tip>.+?),"
+    r" (?P<convention>standard|modified) "
 )
 _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 _NUMBER_COLUMNS = (*COLUMNS, "beta", "offset")
@@ -283,6 +285,9 @@ def _find_convention(grid: _Grid) -> str | None:
     """A heading with the index i-1 means "modified"."""
     if any(column.previous for column in grid.columns):
         return "modified"
+    # Below a title, a name such as "distal" must not select a convention.
+    if title := next(filter(None, map(_TITLE.search, grid.other_lines)), None):
+        return title["convention"]
     text = "\n".join(map(to_plain_text, grid.other_lines))
     names = [name for name, pattern in _CONVENTIONS.items() if re.search(pattern, text, re.IGNORECASE)]
     return names[0] if len(names) == 1 else None
@@ -315,8 +320,11 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _parse_coordinate_names(lines: list[str]) -> list[str]:
-    """Parse a line such as `with q1 = left, q2 = right`."""
-    line = next((line for line in lines if line.startswith("with q1 = ")), "")
+    """Parse a line such as `with q1 = left, q2 = right`, or `with $q_{1}$ = left` in LaTeX."""
+    plain = (
+        re.sub(r"\$q_\{([0-9]+)\}\$ = ", r"q\1 = ", line.removeprefix(r"  \par\medskip ")) for line in lines
+    )
+    line = next((line for line in plain if line.startswith("with q1 = ")), "")
     return [_unescape(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
 

@@ -53,11 +53,13 @@ def format_variable(
     return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
 
 
-def format_coordinate_names(table: DHTable) -> str:
+def format_coordinate_names(table: DHTable, name: str = "q{}", escape: Callable[[str], str] = str) -> str:
     """Return text such as "with q1 = left", or "" if qi is the joint of row i."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
-    return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
+    return "with " + ", ".join(
+        f"{name.format(i)} = {escape(joint)}" for i, joint in enumerate(table.joint_names, 1)
+    )
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
@@ -200,6 +202,8 @@ def write_latex(table: DHTable, units: Units) -> str:
         f"  \\caption{{{_latex_caption(table)}}}",
         *scale_to_fit(frame),
     ]
+    if names := format_coordinate_names(table, name="$q_{{{}}}$", escape=latex_text):
+        lines.append(rf"  \par\medskip {names}")
     lines += [line for what, T in poses.items() for line in latex_pose(what, T)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
