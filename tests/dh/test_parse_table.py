@@ -350,6 +350,10 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
         ),
         ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .* must be 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
         ("[[0, 0, 0.1, 0, 'R', 7]]", {}, r"row 1: .*found 6 entries, \[0, 0, 0.1, 0, 'R', 7\]"),
+        (
+            "[{theta = '-q1', sense = -1}]", {},
+            "row 1, theta: a row with a joint variable must not have `sense`.*: found '-q1', sense -1; write",
+        ),
         ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: `sense` must be 1 or -1: found 1.9"),
         ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: `sense` must be 1 or -1: found '-1.5'"),
         (

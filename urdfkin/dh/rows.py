@@ -234,12 +234,19 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             found=found,
             remedy="write only numbers into all other cells of the row",
         )
-    if cell.variable_factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
+    if cell.variable_factor not in (1.0, -1.0) or cell.variable not in (None, index + 1):
         raise InputError(
             f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=found,
             remedy="for a mimic joint write mimic = {mimicked_joint, multiplier, offset}",
+        )
+    if "sense" in fields:
+        raise InputError(
+            "a row with a joint variable must not have `sense`, because the variable's sign is the sense",
+            where=at,
+            found=f"{found}, sense {fields['sense']!r}",
+            remedy="write only one of them",
         )
     return {"kind": kind, **fields, name: cell.constant, "sense": cell.variable_factor}
 
