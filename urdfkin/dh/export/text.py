@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.snapping import SNAP_SAMPLES, sample_within_limits, travel_condition
+from urdfkin.dh.snapping import SNAP_SAMPLES, largest_travel, sample_within_limits, travel_condition
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import AngleUnit, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
-from urdfkin.model.configuration import joint_value_range, largest_value
+from urdfkin.model.configuration import joint_value_range
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -324,7 +324,7 @@ def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, 
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
-        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
+        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_travel(table, row))
         if row.mimic is not None and printed_row.mimic is not None:
             multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
             total += multiplier_error * _largest_mimicked_value(table, row) * max(lever, 1.0)
