@@ -62,6 +62,17 @@ def format_coordinate_names(table: DHTable, name: str = "q{}", escape: Callable[
     )
 
 
+def format_factor_units(table: DHTable, units: Units) -> str:
+    """Return a sentence about the factor of a mimic joint that turns with a sliding joint or vice versa."""
+    turns = {row.joint: row.kind.turns for row in table.rows}
+    is_mixed = any(
+        row.mimic and turns.get(row.mimic.mimicked_joint, row.kind.turns) != row.kind.turns
+        for row in table.rows
+    )
+    in_si = not units.uses_millimetres and units.angles is AngleUnit.RADIANS
+    return "" if in_si or not is_mixed else "the factors of q are in metres and radians"
+
+
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
     """Return the numbers that the mimic rule adds to theta and d."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
@@ -154,6 +165,7 @@ def table_document(table: DHTable, units: Units, pi: str = "pi", *, wrap: bool =
     parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
     parts += [] if table.rows else ["(no joint between the two frames moves)"]
     parts += ["", names] if (names := format_coordinate_names(table)) else []
+    parts += [note] if (note := format_factor_units(table, units)) else []
     for what, T in (("base", table.base), ("tool", table.tool)):
         if not is_identity(T):
             parts += ["", f"{what} (metres):", pose_matrix(T, units.digits)]
@@ -204,6 +216,8 @@ def write_latex(table: DHTable, units: Units) -> str:
     ]
     if names := format_coordinate_names(table, name="$q_{{{}}}$", escape=latex_text):
         lines.append(rf"  \par\medskip {names}")
+    if note := format_factor_units(table, units):
+        lines.append(rf"  \par {note}")
     lines += [line for what, T in poses.items() for line in latex_pose(what, T)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
