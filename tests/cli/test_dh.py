@@ -48,6 +48,34 @@ def test_a_written_table_can_be_read_compared_and_converted(tmp_path: Path) -> N
     assert run(file, "--format", "urdf").text.startswith('<robot name="ur5"')
 
 
+@pytest.mark.parametrize(
+    "names", ['joint = "base"', 'joint = "tip"', 'joint = "j"}]\nbase_frame = "x"\ntip_frame = "x" #']
+)
+def test_a_table_with_equal_names_of_joints_and_frames_is_checked(names: str, tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text(f'convention = "standard"\nrows = [{{a = 0.3, {names}}}]\n')
+    for options in ([], ["--snap", "1e-6"]):
+        assert "agrees within rounding" in good("dh", str(file), *options).text
+
+
+def test_a_comparison_does_not_hide_that_mimic_rules_are_not_compared(tmp_path: Path) -> None:
+    table, urdf = tmp_path / "arm.toml", str(tmp_path / "arm.urdf")
+    rows = '{{joint = "a", a = 1}}, {{joint = "b", a = 1, mimic = {{mimicked_joint = "a", multiplier = {}}}}}'
+    lines = f'convention = "standard"\nrows = [{rows}]\n'
+    table.write_text(lines.format(2))
+    good("dh", str(table), "--format", "urdf", "-o", urdf)
+    table.write_text(lines.format(3))
+    assert "mimic rules of the table are not compared" in good("dh", urdf, "--compare", str(table)).text
+    data = good("dh", urdf, "--compare", str(table), "--format", "json").data
+    assert {"row": 2, "cell": "mimic"} in data["not_compared"]
+
+
+@pytest.mark.parametrize("words", ["dh ur5 --compare ur5 --tolerance -1", "structure kinova --opw -1"])
+def test_a_negative_tolerance_is_refused(words: str) -> None:
+    refused = urdfkin(words)
+    assert (refused.code, "-1.0 is not in the range x>=0" in refused.err) == (2, True)
+
+
 def test_dh_all_prints_a_table_for_each_leaf() -> None:
     assert good("dh solo12 --all").text.count("standard Denavit-Hartenberg parameters") == 4
     documents = run("solo12", "--all", "--format", "json").data

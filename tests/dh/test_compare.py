@@ -165,6 +165,15 @@ def test_a_cell_that_the_fitted_base_or_tool_compensates_is_no_difference(row: i
     assert compare(make_chain(elbow(), "tip"), other).is_exact
 
 
+@pytest.mark.parametrize("cell", ["a", "alpha", "d"])
+def test_the_cells_of_a_modified_first_row_that_the_base_compensates_are_listed(cell: str) -> None:
+    path, table = published("ur5")
+    modified = to_convention(table, "modified")
+    found = compare(path, with_cells(modified, 0, **{cell: getattr(modified.rows[0], cell) + 0.01}))
+    assert found.agrees
+    assert found.not_compared == ((0, "a"), (0, "alpha"), (0, "d"), (5, "d"))
+
+
 def test_a_table_of_a_different_robot_differs() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     found = compare(make_chain(elbow(), "tip"), other)

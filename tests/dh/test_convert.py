@@ -165,6 +165,21 @@ def test_a_table_can_be_loaded_as_a_robot(name: str) -> None:
     assert robot.certificate().verified
 
 
+@pytest.mark.parametrize("kind", ["R", "P"])
+def test_a_joint_without_position_limits_keeps_its_limits_of_velocity_and_effort(kind: str) -> None:
+    robot = load(table_from_rows([{"kind": kind, "limit": {"velocity": 2, "effort": 3}}], "standard"))
+    limit = robot.tree.joints[0].limit
+    assert limit is not None
+    assert (limit.velocity, limit.effort) == (2.0, 3.0)
+
+
+@pytest.mark.parametrize("kind", ["R", "P"])
+def test_a_single_position_limit_is_not_dropped(kind: str) -> None:
+    table = table_from_rows([{"joint": "slide", "kind": kind, "limit": {"lower": 0}}], "standard")
+    with pytest.raises(InputError, match=r"joint slide: a URDF needs finite position limits .* 0\.0 to inf"):
+        load(table)
+
+
 @pytest.mark.parametrize("root_joint", [None, "floating"])
 def test_a_table_file_can_be_loaded_like_a_urdf(tmp_path: Path, root_joint: str | None) -> None:
     file = tmp_path / "arm.toml"

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
@@ -147,6 +148,26 @@ def test_the_terminal_table_has_the_documented_layout() -> None:
         "base: the identity",
         "tool: the identity",
     ]
+
+
+@pytest.mark.parametrize("form", ["terminal", "markdown", "html", "latex"])
+def test_a_table_in_other_units_states_the_unit_of_the_factor_of_a_sliding_mimic_joint(form: str) -> None:
+    rule = {"mimicked_joint": "a", "multiplier": 0.02}
+    tables = [
+        table_from_rows([{"joint": "a"}, {"joint": "b", "kind": kind, "mimic": rule}], "standard")
+        for kind in ("P", "R")
+    ]
+    units = parse_units("degrees", "millimetres"), parse_units()
+    stated = ["the factors of q are in metres" in export(table, form, u) for table in tables for u in units]
+    assert stated == [True, False, False, False]
+
+
+def test_matlabs_bodies_and_joints_have_different_names_if_the_names_are_not_ascii() -> None:
+    rows = [{"joint": "\u03b1"}, {"joint": "\u03b8"}]
+    text = export(table_from_rows(rows, "standard", base_frame="__link", tip_frame="_"), "matlab-rst")
+    for pattern in (r"(?:BaseName = |rigidBody\()'(.*?)'", r"rigidBodyJoint\('(.*?)'"):
+        names = re.findall(pattern, text)
+        assert len(names) == len(set(names)) >= 2
 
 
 def test_the_latex_table_states_the_convention_in_the_caption_and_escapes_names() -> None:

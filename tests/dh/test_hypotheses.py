@@ -182,6 +182,12 @@ def test_a_table_without_convention_and_in_wrong_units_is_refused_with_the_units
     assert re.search(words, refused("dh", *UR5, "--compare", str(file)))
 
 
+def test_an_error_in_a_table_without_convention_is_reported_with_the_name_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "ur5.toml"
+    file.write_text("rows = [[0, 0, 0, 'x']]\n")
+    assert "ur5.toml, row 1, theta: this is not a number" in refused("dh", *UR5, "--compare", str(file))
+
+
 @pytest.mark.slow
 def test_a_table_that_fits_no_convention_is_refused_with_the_tip_errors(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")

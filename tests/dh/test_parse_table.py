@@ -350,6 +350,10 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
         ),
         ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .* must be 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
         ("[[0, 0, 0.1, 0, 'R', 7]]", {}, r"row 1: .*found 6 entries, \[0, 0, 0.1, 0, 'R', 7\]"),
+        (
+            "[{theta = '-q1', sense = -1}]", {},
+            "row 1, theta: a row with a joint variable must not have `sense`.*: found '-q1', sense -1; write",
+        ),
         ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: `sense` must be 1 or -1: found 1.9"),
         ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: `sense` must be 1 or -1: found '-1.5'"),
         (
@@ -453,6 +457,10 @@ def test_a_csv_file_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
         ("a;alpha;d;theta\n0;0;0;q7\n", "row 1, theta: no row has the joint variable that this row mimics"),
         ("a;alpha;d;theta\n0;0;0;90 deg rad\n", "deg and rad in one cell"),
         ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a must be a length"),
+        ("a;alpha;d;theta;offset [deg]\n0;0;0;q1 + pi/2;5\n", "row 1, offset: offset must be a number in"),
+        ("a;alpha;d;theta;offset\n0;0;0;0;q1\n", "row 1, offset: offset must be a number in the unit of"),
+        ("a;alpha;d;theta;beta\n0;0;0;0;q1\n", "row 1, beta: beta must not contain a joint variable"),
+        ("a;alpha;d;theta;lower [m]\n0;0;0;q1;1\n", "row 1, lower: lower must be an angle: found '1 m'"),
     ],
 )
 def test_an_error_in_a_csv_table_is_reported_with_position_and_reason(
@@ -487,6 +495,58 @@ def test_units_apply_to_base_tool_limits_and_mimic_joints() -> None:
     assert (turn.lower, turn.upper, turn.velocity) == (-math.pi / 2, math.pi, math.pi / 2)
     assert (slide.lower, slide.upper) == (-0.05, 0.5)
     assert (present(rule).multiplier, present(rule).offset) == (2.0, 0.01)
+
+
+@pytest.mark.parametrize("form", ["terminal", "markdown", "latex"])
+def test_a_printed_table_with_mimic_joints_and_misleading_names_is_read(form: str) -> None:
+    rows = [
+        {"a": 1, "joint": "one"},
+        {"a": 2, "joint": "two", "mimic": {"mimicked_joint": "one", "multiplier": -1}},
+        {"a": 3, "joint": "modified", "kind": "P"},
+    ]
+    names = {"robot": "my hand", "base_frame": "craig", "tip_frame": "proximal"}
+    table = table_from_rows(rows, "standard", **names)
+    again = table_from_text(
+        export(table, form), {"terminal": ".txt", "markdown": ".md", "latex": ".tex"}[form]
+    )
+    assert again.rows == table.rows
+    assert (again.convention, again.joint_names) == ("standard", ("one", "modified"))
+    assert {name: getattr(again, name) for name in names} == names
+
+
+def test_a_joint_variable_in_d_adds_the_offset_to_d() -> None:
+    text = "convention: standard\n\na | alpha | d | theta | offset\n0 | 0 | q1 | 0 | 0.05\n"
+    assert table_from_text(text, ".md").rows[0].cells == (0.0, 0.0, 0.05, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("theta", ["0", "q1", "q1 + 10", "q1 + 10°"])
+def test_an_offset_without_a_unit_has_the_unit_of_the_column_theta(theta: str) -> None:
+    text = f"convention: standard\n\na | alpha | d | theta [deg] | offset\n0 | 0 | 0 | {theta} | 5\n"
+    assert table_from_text(text, ".md").rows[0].theta == math.radians(15.0 if "10" in theta else 5.0)
+
+
+def test_a_printed_pose_is_in_metres_also_in_a_table_in_millimetres() -> None:
+    text = "lengths: mm\nconvention: standard\n\na | alpha | d | theta\n0 | 0 | 100 | q1\n"
+    pose = "base (metres):\n  1  0  0  0.5\n  0  1  0  0\n  0  0  1  0.1\n"
+    table = table_from_text(f"{text}\n{pose}", ".md")
+    assert (table.rows[0].d, table.base[:3, 3].tolist()) == (0.1, [0.5, 0.0, 0.1])
+
+
+def test_a_unit_in_the_heading_of_a_limit_is_read() -> None:
+    heading = "theta [deg],d,a,alpha,sigma,lower [deg],upper (deg)"
+    limit = table_from_text(f"# convention: standard\n{heading}\n0,0,0,0,0,-90,45\n", ".csv").rows[0].limit
+    assert (present(limit).lower, present(limit).upper) == (-math.pi / 2, math.pi / 4)
+
+
+def test_a_multiple_of_pi_is_in_radians_also_in_limits_and_mimic_joints_of_a_table_in_degrees() -> None:
+    rows = [
+        {"joint": "a", "limit": {"lower": "-pi/2", "upper": 180}},
+        {"joint": "b", "mimic": {"mimicked_joint": "a", "offset": "pi/4"}},
+    ]
+    table = table_from_rows(rows, "standard", angles="degrees")
+    limit = present(table.rows[0].limit)
+    assert (limit.lower, limit.upper) == (-math.pi / 2, math.pi)
+    assert present(table.rows[1].mimic).offset == math.pi / 4
 
 
 def test_lists_arrays_and_short_names_of_units_are_accepted() -> None:

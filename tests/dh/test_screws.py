@@ -15,7 +15,8 @@ from scipy.linalg import expm
 from tests.cli.running import good
 from tests.random_chains import trees
 from urdfkin.dh.export.toolboxes import write_screws
-from urdfkin.dh.screws import make_screws, screws_from_rows
+from urdfkin.dh.parse_table import read_table_or_screws
+from urdfkin.dh.screws import ProductOfExponentials, make_screws, screws_from_rows
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import make_chain
@@ -153,6 +154,52 @@ def test_exported_code_contains_the_screws_as_columns(tmp_path: Path) -> None:
 def test_an_invalid_screw_is_refused_with_the_reason(screws: Any, home: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         screws_from_rows(screws, home)
+
+
+@pytest.mark.parametrize("form", ["toml", "json"])
+def test_the_names_in_a_screw_file_are_not_changed(form: str, tmp_path: Path) -> None:
+    arm, path = (
+        screws_from_rows(SPACE[:2], M, joints=["\U0001f600", "tip"], tip_frame="x\x7f"),
+        tmp_path / "a",
+    )
+    path = path.with_suffix(f".{form}")
+    path.write_text(write_screws(arm, form), "utf-8")
+    again = read_table_or_screws(path)
+    assert isinstance(again, ProductOfExponentials)
+    assert [joint.name for joint in again.joints] == ["\U0001f600", "tip"]
+    assert again.tip_frame == "x\x7f"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        {"joints": ["base", "tip"]},
+        {"joints": ["tip_fixed", "b"]},
+        {"base_frame": "joint_1_link"},
+        {"base_frame": "x", "tip_frame": "x"},
+    ],
+)
+def test_screws_with_equal_names_of_joints_and_frames_can_be_loaded(names: dict[str, Any]) -> None:
+    screws = screws_from_rows(SPACE[:2], M, **names)
+    robot = load(screws)
+    T = robot.placement([0.3, 0.4], f"link:{robot.tree.links[-1]}")
+    np.testing.assert_allclose(T, screws.placement([0.3, 0.4]), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("joints = [1]", "arm.toml, joints: a name must be text: found 1"),
+        ("joints = 'j'", "arm.toml, joints: `joints` must be a list of names: found 'j'"),
+        ("joints = ['j', 'j']", "arm.toml, joints: two screws name the same joint: found 'j'"),
+        ("robot = 5", "arm.toml, robot: a name must be text: found 5"),
+    ],
+)
+def test_a_wrong_name_in_a_screw_file_is_reported(line: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(f"M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nspace = [[0, 0, 1, 0, 0, 0]]\n{line}\n")
+    with pytest.raises(InputError, match=message):
+        load(path)
 
 
 def test_an_error_in_a_screw_file_is_reported_with_the_position(tmp_path: Path) -> None:

@@ -209,6 +209,24 @@ def test_the_bound_of_printed_digits_covers_a_small_multiplier_of_a_mimic_rule(b
     assert 0.0 < found.metres <= present(found.bound)
 
 
+def test_the_bounds_cover_a_mimic_joint_that_leaves_its_own_limits() -> None:
+    # Joint "far" moves between 1 m and 7 m, although its limits allow only 0.1 m.
+    tilted, narrow = rotation("x", math.pi / 4 + OFF), Limit(-0.1, 0.1, 1.0, 1.0)
+    joints = [
+        (z_joint("near", tilted, JointKind.PRISMATIC, limit=Limit(0.0, 3.0, 1.0, 1.0)), "l0", "l1"),
+        (
+            z_joint("far", tilted, JointKind.PRISMATIC, limit=narrow, mimic=Mimic("near", 2.0, 1.0)),
+            "l1",
+            "tip",
+        ),
+    ]
+    tree = build_tree("arm", "l0", joints)
+    snap = present(make_dh_table(tree, "tip", snap=10 * OFF).snap)
+    assert 0.0 < snap.measured_metres <= snap.metres
+    printed = measure_printed_table(make_dh_table(tree, "tip"), Units(digits=3))
+    assert 0.0 < printed.metres <= present(printed.bound)
+
+
 def test_a_snap_report_sums_the_bounds_of_all_changes() -> None:
     changes = (SnapChange(1, "x", 1e-3, 2.0, ("s",)), SnapChange(-1, "y", 2e-3, 5.0))
     said = SnapReport(1e-2, changes, 0.0, 0.0, {"s": 1e-3})

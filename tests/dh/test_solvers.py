@@ -193,6 +193,14 @@ def test_the_opw_parameters_of_a_random_arm_are_identified(seed: int) -> None:
     assert min(found.lengths[name] for name in ("c1", "c2", "c3")) >= 0.0
 
 
+def test_an_arm_with_the_tip_against_the_last_axis_is_an_opw_arm() -> None:
+    lengths = dict(zip(NAMES, (-0.1, -0.1, 0.0, 0.4, 0.5, 0.5, 0.1), strict=True))
+    arm = table(lengths, [0.0, 0.0, 0.0, H, 2 * H, 2 * H], [1, 1, 1, -1, 1, -1])
+    path = load(arm, verify=False).chain("tip", "base")
+    q = np.random.default_rng(0).uniform(-3, 3, (50, 6))
+    np.testing.assert_allclose(find_opw(path).placement(q), path.placement(q), atol=1e-12)
+
+
 def test_six_joints_with_a_prismatic_joint_are_not_an_opw_arm() -> None:
     rows: list[list[object]] = [[*row, "P" if i == 2 else "R"] for i, row in enumerate(PUMA)]
     path = load(table_from_rows(rows, "modified"), verify=False)

@@ -54,6 +54,16 @@ def test_a_table_like_another_agrees_with_the_urdf_within_rounding(tree: Kinemat
         assert apart <= 20 * float(table.rounding(q)) + 1e-13
 
 
+def test_the_base_contains_the_offset_if_the_first_two_axes_are_parallel_and_d_is_zero() -> None:
+    rows = [[0.5, 0, 0, 0], [0.3, "pi/2", 0, 0], [0.2, 0, 0, 0]]
+    reference = table_from_rows(rows, "standard", base=shift(0.0, 0.0, 0.4))
+    tree = load(reference).tree
+    for like in (reference, replace(reference, base=np.eye(4))):
+        table = make_dh_table(tree, "tip", like=like)
+        assert [row.cells for row in table.rows] == [row.cells for row in reference.rows]
+        np.testing.assert_array_equal(table.base, reference.base)
+
+
 @pytest.mark.parametrize("twist", [1.0, 0.25, 0.05])
 def test_the_zero_of_a_prismatic_joint_may_be_in_d_of_a_coaxial_revolute_joint(twist: float) -> None:
     rows = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, "P"], [0.0, twist, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]

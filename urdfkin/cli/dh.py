@@ -11,6 +11,7 @@ import click
 
 from urdfkin.cli.options import (
     FiniteNumber,
+    NumberInRange,
     combine,
     digits_option,
     is_on_command_line,
@@ -131,7 +132,7 @@ compare_options = combine(
     ),
     click.option(
         "--tolerance",
-        type=FiniteNumber(),
+        type=NumberInRange(min=0),
         default=0.2,
         metavar="MM",
         help="With --compare: largest allowed error of the tip in millimetres.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from urdfkin.dh.compare import (
     find_better_interpretation,
     find_dh_convention,
 )
-from urdfkin.dh.convert import to_urdf
+from urdfkin.dh.convert import link_names, to_urdf
 from urdfkin.dh.export.data import to_mapping
 from urdfkin.dh.export.text import measure_printed_table
 from urdfkin.dh.parse_table import (
@@ -48,6 +48,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import draw_samples
+from urdfkin.model.tree import LinkFrame
 from urdfkin.robot import Robot
 from urdfkin.system.files import expand_home
 from urdfkin.verify.tables import TableCheck
@@ -128,7 +129,10 @@ def _make_tables_answer(request: DHRequest) -> Answer:
     if len(tips) > 1:
         _require_format(request, "--all", _MULTI_TABLE_FORMATS)
     tables = [_make_table(request, tip, request.snap) for tip in tips]
-    checks = [verifier.check_table(table) if verifier.policy else None for table in tables]
+    checks = [
+        verifier.check_table(_with_link_frames(request, table)) if verifier.policy else None
+        for table in tables
+    ]
     results = list(zip(tables, checks, strict=True))
     if format_ == "json":
         lock = lock_settings(request.robot)
@@ -163,6 +167,15 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
     convention = request.convention or (like.convention if like else "standard")
     return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **request.dh_arguments)
+
+
+def _with_link_frames(request: DHRequest, table: DHTable) -> DHTable:
+    """In the robot made from a table, a joint can have the name of the table's base or tip."""
+    links = link_names(table)
+    # A table that is derived from screws already has unambiguous names, such as "link:tip".
+    if request.unchanged_table is None or not {links[0], links[-1]} <= set(request.robot.tree.links):
+        return table
+    return replace(table, base_frame=LinkFrame.of(links[0]), tip_frame=LinkFrame.of(links[-1]))
 
 
 def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> str:
@@ -246,6 +259,8 @@ def _make_comparison_answer(request: DHRequest, name: str) -> Answer:
         if mistake := find_better_interpretation(chain, data, tolerance):
             error.remedy = f"{error.remedy}; {mistake}" if error.remedy else str(mistake)
         raise
+    if any(row.mimic for row in reference.rows):
+        notes.append("The mimic rules of the table are not compared: each joint moves independently.")
     found = compare(chain, reference, tolerance, fit=request.fit, half_digits=half_digits_by_row(data))
     mistake = _better_interpretation(chain, data, reference, found)
     if request.format_ == "json":
@@ -300,7 +315,10 @@ def _comparison_data(
         "samples": found.samples,
         "senses": list(found.senses),
         "offsets": list(found.offsets),
-        "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.not_compared],
+        "not_compared": [
+            *({"row": row + 1, "cell": cell} for row, cell in found.not_compared),
+            *({"row": i, "cell": "mimic"} for i, row in enumerate(reference.rows, 1) if row.mimic),
+        ],
         "differences": [_difference_data(one) for one in found.differences],
         "likely_mistakes": [_mistake_data(one) for one in found.mistakes],
         "would_fit_read_as": mistake and mistake.as_mapping(),

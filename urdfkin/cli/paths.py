@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.options import (
-    FiniteNumber,
+    NumberInRange,
     convention_of_input_option,
     digits_option,
     find_conversion,
@@ -173,7 +173,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 @path_options
 @click.option(
     "--opw",
-    type=FiniteNumber(),
+    type=NumberInRange(min=0),
     metavar="MM",
     help="Print the parameters of an OPW solver as YAML, instead of the structure. MM is the largest allowed"
     " error of the tip's coordinates in millimetres. MM / 1000 is the largest allowed error of the entries of"

@@ -251,16 +251,23 @@ class PairWithReference:
 
 
 def match_axis_transforms(
-    pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
+    pairs: Sequence[PairWithReference],
+    phi_in: float,
+    delta_in: float,
+    tip_offset: float | None,
+    *,
+    keeps_first_d: bool = True,
 ) -> tuple[list[AxisTransform], list[float]]:
     """Match the reference's cells; return the transform and the first joint's theta of each pair.
 
     Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint. `tip_offset` is the required `delta_in` of
-    the last joint, or None if any `delta_in` is allowed.
+    the last joint, or None if any `delta_in` is allowed. Without `keeps_first_d`, a zero d of the reference's
+    first row is not copied.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
-        inputs.append((delta_in, _choose_d(pairs, i, delta_in, tip_offset)))
+        keeps_d = i > 0 or (keeps_first_d and not pair.row.d)
+        inputs.append((delta_in, _choose_d(pairs, i, delta_in, tip_offset, keeps_d)))
         steps.append(pair.find_transform(*inputs[-1]))
         delta_in = steps[-1].delta_next
     thetas = []
@@ -274,18 +281,20 @@ def match_axis_transforms(
     return steps, thetas
 
 
-def _choose_d(pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None) -> float:
+def _choose_d(
+    pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None, keeps_d: bool
+) -> float:
     """Choose d of row i.
 
-        axes determine d                              any number, because `find_transform` ignores d
-        revolute joint, i > 0 or reference d = 0      d of the reference
-        other joints                                  d with which another cell equals the reference
+        axes determine d               any number, because `find_transform` ignores d
+        revolute joint, `keeps_d`      d of the reference
+        other joints                   d with which another cell equals the reference
 
     The other cell is d of a later row, or a of a Hayati row. Without such a cell, d equals d of the
     reference.
     """
     pair = pairs[i]
-    if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
+    if not pair.offset_is_free or (keeps_d and not pair.is_prismatic):
         return pair.row.d
     end = i + 1
     while end < len(pairs) and pairs[end].offset_is_free and not pairs[end].is_prismatic:

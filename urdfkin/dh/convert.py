@@ -15,6 +15,7 @@ i - 1 of a standard table, or frame i of a modified table.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -29,7 +30,6 @@ from urdfkin.model.tree import (
     Limit,
     Mimic,
     build_tree,
-    is_bounded,
 )
 from urdfkin.urdf.writer import to_urdf as write_urdf
 
@@ -157,11 +157,25 @@ def make_unique(name: str, taken: list[str]) -> str:
 
 
 def _tree_kind(row: DHRow) -> JointKind:
-    unbounded = row.kind is JointKind.REVOLUTE and not is_bounded(row.limit)
-    return JointKind.CONTINUOUS if unbounded else row.kind
+    return JointKind.CONTINUOUS if row.kind.turns and _has_no_bound(row.limit) else row.kind
 
 
 def _tree_limit(row: DHRow) -> Limit | None:
-    if is_bounded(row.limit) or row.kind is JointKind.CONTINUOUS:
+    """Return the row's limit; a prismatic joint without position limits gets the default ones.
+
+    The URDF writer rejects a joint with only one position limit.
+    """
+    if row.kind.turns or not _has_no_bound(row.limit):
         return row.limit
-    return None if row.kind.turns else DEFAULT_PRISMATIC_LIMIT
+    limit, given = DEFAULT_PRISMATIC_LIMIT, row.limit
+    if given is None:
+        return limit
+    velocity, effort = (
+        one if math.isfinite(one) else default
+        for one, default in ((given.velocity, limit.velocity), (given.effort, limit.effort))
+    )
+    return replace(limit, velocity=velocity, effort=effort)
+
+
+def _has_no_bound(limit: Limit | None) -> bool:
+    return limit is None or (math.isinf(limit.lower) and math.isinf(limit.upper))

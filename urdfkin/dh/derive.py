@@ -44,6 +44,11 @@ from urdfkin.model.tree import FloatArray
 #: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
+#: Two tables describe different robots if alpha, a or d differ by more than this number.
+#: Angles are in rad, and lengths are relative to the reach.
+#: Cells are not compared if a different base, tool or prismatic axis can compensate for their difference.
+MAX_CELL_DIFFERENCE = 0.1
+
 _OPTION_VALUES = {
     "near_parallel": ("hayati", "strict"),
     "last": ("tip", "flange"),
@@ -102,6 +107,9 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
         ]
         tip = _offset_for_last_row(like, constants[-1], options, end)
         steps, thetas = match_axis_transforms(pairs, phi_in, delta_in, tip)
+        if not like.rows[0].d and _has_wrong_offset(steps, like, chain.reach):
+            # The offset along the first axis is then a part of the base.
+            steps, thetas = match_axis_transforms(pairs, phi_in, delta_in, tip, keeps_first_d=False)
     if steps:
         phi_in, delta_in = steps[-1].phi_next, steps[-1].delta_next
     rows = [(theta, step.delta) for theta, step in zip(thetas, steps, strict=True)]
@@ -276,6 +284,13 @@ def _find_transforms_and_thetas(
         thetas.append(theta)
         phi_in, delta_in = step.phi_next, step.delta_next
     return steps, thetas
+
+
+def _has_wrong_offset(steps: Sequence[AxisTransform], like: DHTable, reach: float) -> bool:
+    return any(
+        row.kind.turns and abs(step.delta - row.d) > MAX_CELL_DIFFERENCE * reach
+        for step, row in zip(steps[1:], like.rows[1:], strict=False)
+    )
 
 
 def _offset_for_last_row(

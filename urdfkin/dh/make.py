@@ -15,17 +15,13 @@ from urdfkin.dh.common_normals import check_lengths
 from urdfkin.dh.compare.agreement import check_joints
 from urdfkin.dh.compare.signs import find_sign_fits
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import DerivationOptions, derive
+from urdfkin.dh.derive import MAX_CELL_DIFFERENCE, DerivationOptions, derive
 from urdfkin.dh.snapping import check_snap_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference, convention_of
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: Two tables describe different robots if alpha, a or d differ by more than this number.
-#: Angles are in rad, and lengths are relative to the reach.
-#: Cells are not compared if a different base, tool or prismatic axis can compensate for their difference.
-_MAX_CELL_DIFFERENCE = 0.1
 #: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _SAME_ANGLE_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
@@ -58,7 +54,7 @@ def find_reversed_joints(
         table = derive(chain, replace(options, convention=DHConvention.STANDARD, flip=flip), standard)
         if (key := _difference_key(table, standard, chain.reach or 1.0)) < best:
             best, best_flip = key, flip
-    if best[0] > _MAX_CELL_DIFFERENCE:
+    if best[0] > MAX_CELL_DIFFERENCE:
         raise InputError(
             "the table in the argument `like` describes a different robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",

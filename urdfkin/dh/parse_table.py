@@ -24,7 +24,7 @@ import numpy as np
 from urdfkin.dh.rows import LIMIT_KEYS, NumberWithText, table_from_mapping
 from urdfkin.dh.screws import ProductOfExponentials, screws_from_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, to_plain_text
+from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, parse_units, to_plain_text
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNIT_SHORT_NAMES
@@ -59,8 +59,10 @@ _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
     "standard": r"\b(?:standard|classic(?:al)?|distal|paul(?:'s)?)\b",
 }
+#: The names and the convention in the title of a table that urdfkin prints.
 _TITLE = re.compile(
-    r"(?:^|parameters of )(?:\*\*)?(?P<robot>\S+?)(?:\*\*)?[:,] (?P<base>\S+) to (?P<tip>\S+?),"
+    r"^(?:.*\bparameters of )?(?:\*\*)?(?P<robot>.+?)(?:\*\*)?[:,] (?P<base>.+?) to (?P<tip>.+?),"
+    r" (?P<convention>standard|modified) "
 )
 _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 _NUMBER_COLUMNS = (*COLUMNS, "beta", "offset")
@@ -89,7 +91,9 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             data = names | data
     for end in ("base", "tool"):
         if end not in data and (pose := _parse_pose(end, grid.other_lines)):
-            data[end] = pose
+            # The printed pose is in metres, also if the table is in millimetres.
+            in_millimetres = parse_units(lengths=data.get("lengths", "metres")).uses_millimetres
+            data[end] = [[*row[:3], row[3] * 1e3 if in_millimetres else row[3]] for row in pose]
     data["rows"] = [_parse_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
     _replace_mimic_variables(data, _parse_coordinate_names(grid.other_lines))
     return data
@@ -281,6 +285,9 @@ def _find_convention(grid: _Grid) -> str | None:
     """A heading with the index i-1 means "modified"."""
     if any(column.previous for column in grid.columns):
         return "modified"
+    # Below a title, a name such as "distal" must not select a convention.
+    if title := next(filter(None, map(_TITLE.search, grid.other_lines)), None):
+        return title["convention"]
     text = "\n".join(map(to_plain_text, grid.other_lines))
     names = [name for name, pattern in _CONVENTIONS.items() if re.search(pattern, text, re.IGNORECASE)]
     return names[0] if len(names) == 1 else None
@@ -313,8 +320,11 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _parse_coordinate_names(lines: list[str]) -> list[str]:
-    """Parse a line such as `with q1 = left, q2 = right`."""
-    line = next((line for line in lines if line.startswith("with q1 = ")), "")
+    """Parse a line such as `with q1 = left, q2 = right`, or `with $q_{1}$ = left` in LaTeX."""
+    plain = (
+        re.sub(r"\$q_\{([0-9]+)\}\$ = ", r"q\1 = ", line.removeprefix(r"  \par\medskip ")) for line in lines
+    )
+    line = next((line for line in plain if line.startswith("with q1 = ")), "")
     return [_unescape(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
 
@@ -333,11 +343,14 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             row[column.name] = _add_unit(cell, column, where, grid)
         elif column.name == "kind":
             row["kind"] = _KINDS_BY_SIGMA.get(cell, cell)
+        elif column.name in LIMIT_KEYS and column.unit:
+            row[column.name] = f"{cell} {column.unit}"
         else:
             row[column.name] = (
                 from_csv_cell(_unescape(cell)) if column.name in ("joint", "mimicked_joint") else cell
             )
-    return _nest_row(row)
+    units = {column.name: column.unit for column in grid.columns}
+    return _nest_row(row, units, f"row {index + 1}, offset")
 
 
 def _add_unit(original: str, column: _Column, where: str, grid: _Grid) -> str:
@@ -367,16 +380,31 @@ def _unescape(name: str) -> str:
     return re.sub(r"\\([_&%$#{}])", r"\1", name)
 
 
-def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
+def _nest_row(row: dict[str, Any], units: Mapping[str, str | None], where: str) -> dict[str, Any]:
     """Without a mimic rule, add the offset to theta or d."""
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("mimicked_joint", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
     limit = {key: row.pop(key) for key in LIMIT_KEYS if key in row}
     if "offset" in row:
-        name = "d" if str(row.get("kind", "R")).upper().startswith("P") else "theta"
-        row[name] = f"{row[name]} + {row.pop('offset')}".replace("+ -", "- ").replace("+ +", "+ ")
+        _add_offset(row, row.pop("offset"), units, where)
     return {**row, **({"mimic": mimic} if mimic else {}), **({"limit": limit} if limit else {})}
+
+
+def _add_offset(row: dict[str, Any], offset: str, units: Mapping[str, str | None], where: str) -> None:
+    slides = parse_cell(row["d"]).variable_factor is not None
+    name = "d" if str(row.get("kind", "P" if slides else "R")).upper().startswith("P") else "theta"
+    cell, added = parse_cell(row[name]), parse_cell(offset)
+    unit = added.unit or units[name]
+    if added.variable_factor is not None or (cell.number and added.number and cell.unit != unit):
+        raise InputError(
+            f"offset must be a number in the unit of {name}",
+            where=where,
+            found=f"{safe_repr(offset)}, and {safe_repr(row[name])} in {name}",
+            remedy="write both with the same unit",
+        )
+    offset = offset if added.unit else f"{offset} {unit or ''}"
+    row[name] = f"{row[name]} + {offset}".replace("+ -", "- ").replace("+ +", "+ ")
 
 
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:

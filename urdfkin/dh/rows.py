@@ -234,12 +234,19 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             found=found,
             remedy="write only numbers into all other cells of the row",
         )
-    if cell.variable_factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
+    if cell.variable_factor not in (1.0, -1.0) or cell.variable not in (None, index + 1):
         raise InputError(
             f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=found,
             remedy="for a mimic joint write mimic = {mimicked_joint, multiplier, offset}",
+        )
+    if "sense" in fields:
+        raise InputError(
+            "a row with a joint variable must not have `sense`, because the variable's sign is the sense",
+            where=at,
+            found=f"{found}, sense {fields['sense']!r}",
+            remedy="write only one of them",
         )
     return {"kind": kind, **fields, name: cell.constant, "sense": cell.variable_factor}
 
@@ -262,19 +269,27 @@ def _parse_cell_text(text: str, where: str) -> Cell:
         ) from None
 
 
+def _parse_quantity(
+    name: str, value: Any, is_length: bool, units: Units, where: str
+) -> tuple[float, Units, bool]:
+    """Return a number, its units, and whether the value states its own unit."""
+    if not isinstance(value, str):
+        return parse_number(value, where), units, False
+    cell = _parse_cell_text(value, where)
+    if cell.variable_factor is not None:
+        raise InputError(f"{name} must not contain a joint variable", where=where, found=repr(value))
+    if cell.unit is None:
+        return cell.number, units, False
+    if (cell.unit in ("m", "mm")) != is_length:
+        kind = "a length" if is_length else "an angle"
+        raise InputError(f"{name} must be {kind}", where=where, found=repr(value))
+    return cell.number, units_of_cell(cell, units), True
+
+
 def _parse_value(name: str, value: Any, units: Units, where: str) -> float:
-    is_length, at, unit = name in ("a", "d"), f"{where}, {name}", None
-    if isinstance(value, str):
-        cell = _parse_cell_text(value, at)
-        number, unit = cell.number, cell.unit
-        if unit is not None:
-            if (unit in ("m", "mm")) != is_length:
-                kind = "a length" if is_length else "an angle"
-                raise InputError(f"{name} must be {kind}", where=at, found=repr(value))
-            units = units_of_cell(cell, units)
-    else:
-        number = parse_number(value, at)
-    may_be_degrees = not is_length and unit is None and units.angles is AngleUnit.RADIANS
+    is_length, at = name in ("a", "d"), f"{where}, {name}"
+    number, units, has_unit = _parse_quantity(name, value, is_length, units, at)
+    may_be_degrees = not is_length and not has_unit and units.angles is AngleUnit.RADIANS
     if may_be_degrees and abs(number) > 2.0 * math.pi:
         raise InputError(
             f"{name} is more than one turn in radians",
@@ -310,8 +325,9 @@ def _parse_sense(value: Any, where: str) -> int:
 
 
 def _parse_joint_value(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    number = parse_number(value, f"{where}, {name}")
-    return convert_to_si("theta" if _parse_kind(fields.get("kind", "R"), where).turns else "d", number, units)
+    turns = _parse_kind(fields.get("kind", "R"), where).turns
+    number, units, _ = _parse_quantity(name, value, not turns, units, f"{where}, {name}")
+    return convert_to_si("theta" if turns else "d", number, units)
 
 
 def _parse_mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Mimic | None:

@@ -20,10 +20,11 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.convert import DEFAULT_PRISMATIC_LIMIT, make_link_names, make_serial_tree, make_unique
 from urdfkin.dh.export.text import pose_matrix
-from urdfkin.dh.rows import check_keys
+from urdfkin.dh.rows import check_keys, parse_name
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
+from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
@@ -292,7 +293,7 @@ def screws_from_rows(
         tip_frame: The tip frame's name.
 
     Raises:
-        InputError: a shape, a screw, M or `frame` is invalid, or the number of names is wrong.
+        InputError: a shape, a screw, a name, M or `frame` is invalid, or the number of names is wrong.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
@@ -308,7 +309,7 @@ def screws_from_rows(
     if frame == "body":
         w = S[:, :3] @ T[:3, :3].T
         S = np.hstack([w, S[:, 3:] @ T[:3, :3].T + np.cross(T[:3, 3], w)])
-    names = tuple(joints) or tuple(f"joint_{i + 1}" for i in range(len(S)))
+    names = _parse_joint_names(joints) or tuple(f"joint_{i + 1}" for i in range(len(S)))
     if len(names) != len(S):
         raise InputError(
             "the number of names and the number of screws differ",
@@ -336,7 +337,18 @@ def screws_from_rows(
             )
         S[i, 3:] -= pitch * S[i, :3]
         named.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
-    return ProductOfExponentials(tuple(named), freeze(T), freeze(S), robot, base_frame, tip_frame)
+    texts = {"robot": robot, "base_frame": base_frame, "tip_frame": tip_frame}
+    ends = [parse_name(text, where) for where, text in texts.items()]
+    return ProductOfExponentials(tuple(named), freeze(T), freeze(S), *ends)
+
+
+def _parse_joint_names(joints: Any) -> tuple[str, ...]:
+    if not isinstance(joints, Sequence) or isinstance(joints, str):
+        raise InputError("`joints` must be a list of names", where="joints", found=safe_repr(joints))
+    names = tuple(parse_name(name, "joints") for name in joints)
+    if double := next((name for name in names if names.count(name) > 1), None):
+        raise InputError("two screws name the same joint", where="joints", found=repr(double))
+    return names
 
 
 def screws_from_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:

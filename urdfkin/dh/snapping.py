@@ -21,6 +21,7 @@ import numpy as np
 
 from urdfkin.dh.table import (
     DHConvention,
+    DHRow,
     DHTable,
     SnapChange,
     SnapReport,
@@ -99,7 +100,7 @@ def snap_report(
     for change in changes:
         for name in change.prismatic_joints:
             per_metre[name] = per_metre.get(name, 0.0) + change.angle
-    travels = {row.joint: largest_value(row.limit) for row in table.rows}
+    travels = {row.joint: largest_travel(table, row) for row in table.rows}
     metres = sum((change.tip_displacement for change in changes), 0.0)
     metres += sum(rate * travels[name] for name, rate in per_metre.items())
     q = sample_within_limits(table)
@@ -119,8 +120,24 @@ def snap_report(
 
 
 def sample_within_limits(table: DHTable) -> FloatArray:
-    ranges = {row.joint: joint_value_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
+    ranges = _coordinate_ranges(table)
     return sample_uniform([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SNAP_SAMPLES)
+
+
+def _coordinate_ranges(table: DHTable) -> dict[str, tuple[float, float]]:
+    return {row.joint: joint_value_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
+
+
+def largest_travel(table: DHTable, row: DHRow) -> float:
+    """Return the largest absolute value (m) of a prismatic joint.
+
+    A mimic joint can leave its own limits while the mimicked joint is within its limits.
+    """
+    largest = largest_value(row.limit)
+    if (rule := row.mimic) is None:
+        return largest
+    ends = _coordinate_ranges(table).get(rule.mimicked_joint, _UNKNOWN_RANGE)
+    return max(largest, *(abs(rule.multiplier * end + rule.offset) for end in ends))
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:

@@ -28,7 +28,7 @@ import numpy as np
 from urdfkin.dh.derive import DerivationOptions, derive
 from urdfkin.dh.make import derive_matching_table, find_reversed_joints
 from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference, is_identity
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import joint_value_range, largest_value, sample_uniform
@@ -396,7 +396,9 @@ def _read_parameters(table: DHTable) -> OpwParameters:
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
     offsets = (angle_difference(zero, row.theta) + 0.0 for zero, row in zip(_THETA, rows, strict=True))
     names, signs = tuple(row.joint for row in rows), tuple(row.sense for row in rows)
-    return OpwParameters(names, lengths, tuple(offsets), signs, table.base, table.tool)
+    # The last row of an OPW table has a = 0 and alpha = 0.
+    tool = table.tool if is_identity(rows[5].X) else rows[5].X @ table.tool
+    return OpwParameters(names, lengths, tuple(offsets), signs, table.base, tool)
 
 
 def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:

@@ -68,7 +68,7 @@ def compare(
 
     The table may have other base and tip frames than the path. The table's base (tip) frame must be fixed
     to the path's base (tip) link. `tolerance` (m) applies at the tip. With `fit`, base, tool, joint offsets
-    and signs are fitted first.
+    and signs are fitted first. Mimic rules are not compared: each joint moves independently.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -218,7 +218,10 @@ def _find_compensated_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
     """Return row index and name of each cell with an error that a fit compensates."""
-    compensated = []
+    compensated = list[tuple[int, str]]()
+    if reference.convention is DHConvention.MODIFIED:
+        # In the standard table, these cells are a part of the base.
+        compensated += [(0, cell) for cell in ("a", "alpha")] + [(0, "beta")] * bool(reference.rows[0].beta)
     for i, k in find_compensated_cells(fitted, check_targets):
         reference_index = _reference_row_index(reference, i, CELLS[k])
         if (

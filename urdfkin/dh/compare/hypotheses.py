@@ -24,6 +24,7 @@ from urdfkin.dh.compare.agreement import compare, fast_fit_errors
 from urdfkin.dh.compare.result import TableComparison
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import DerivationOptions, derive
+from urdfkin.dh.parse_table import parse_table_data
 from urdfkin.dh.rows import name_cells, table_from_mapping
 from urdfkin.dh.table import DHConvention, DHTable, convention_of, looks_round
 from urdfkin.dh.units import COLUMNS, AngleUnit, LengthUnit, parse_units
@@ -137,7 +138,7 @@ def find_dh_convention(
     errors = list[InputError]()
     for convention in DHConvention:
         try:
-            table = table_from_mapping({**data, "convention": convention})
+            table = parse_table_data({**data, "convention": convention}, where)
             comparisons[convention] = compare(chain, table, tolerance)
         except InputError as error:
             errors.append(error)

@@ -73,16 +73,16 @@ def write_json(table: DHTable) -> str:
 def write_toml(table: DHTable) -> str:
     data = to_mapping(table)
     rows = data.pop("rows")
-    lines = [f"{key} = {_format_toml_value(value)}" for key, value in data.items()]
-    lines += ["rows = [", *(f"  {_format_toml_value(row)}," for row in rows), "]"]
+    lines = [f"{key} = {format_toml_value(value)}" for key, value in data.items()]
+    lines += ["rows = [", *(f"  {format_toml_value(row)}," for row in rows), "]"]
     return "\n".join(lines) + "\n"
 
 
-def _format_toml_value(value: Any) -> str:
+def format_toml_value(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_format_toml_value(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{key} = {format_toml_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(_format_toml_value(item) for item in value) + "]"
+        return "[" + ", ".join(format_toml_value(item) for item in value) + "]"
     # TOML accepts JSON's numbers and escapes, but no surrogate pairs.
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     return "".join(c if c.isprintable() else escape_sequence(c) for c in text)

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.snapping import SNAP_SAMPLES, sample_within_limits, travel_condition
+from urdfkin.dh.snapping import SNAP_SAMPLES, largest_travel, sample_within_limits, travel_condition
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import AngleUnit, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
-from urdfkin.model.configuration import joint_value_range, largest_value
+from urdfkin.model.configuration import joint_value_range
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -53,11 +53,24 @@ def format_variable(
     return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
 
 
-def format_coordinate_names(table: DHTable) -> str:
+def format_coordinate_names(table: DHTable, name: str = "q{}", escape: Callable[[str], str] = str) -> str:
     """Return text such as "with q1 = left", or "" if qi is the joint of row i."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
-    return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
+    return "with " + ", ".join(
+        f"{name.format(i)} = {escape(joint)}" for i, joint in enumerate(table.joint_names, 1)
+    )
+
+
+def format_factor_units(table: DHTable, units: Units) -> str:
+    """Return a sentence about the factor of a mimic joint that turns with a sliding joint or vice versa."""
+    turns = {row.joint: row.kind.turns for row in table.rows}
+    is_mixed = any(
+        row.mimic and turns.get(row.mimic.mimicked_joint, row.kind.turns) != row.kind.turns
+        for row in table.rows
+    )
+    in_si = not units.uses_millimetres and units.angles is AngleUnit.RADIANS
+    return "" if in_si or not is_mixed else "the factors of q are in metres and radians"
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
@@ -152,6 +165,7 @@ def table_document(table: DHTable, units: Units, pi: str = "pi", *, wrap: bool =
     parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
     parts += [] if table.rows else ["(no joint between the two frames moves)"]
     parts += ["", names] if (names := format_coordinate_names(table)) else []
+    parts += [note] if (note := format_factor_units(table, units)) else []
     for what, T in (("base", table.base), ("tool", table.tool)):
         if not is_identity(T):
             parts += ["", f"{what} (metres):", pose_matrix(T, units.digits)]
@@ -200,6 +214,10 @@ def write_latex(table: DHTable, units: Units) -> str:
         f"  \\caption{{{_latex_caption(table)}}}",
         *scale_to_fit(frame),
     ]
+    if names := format_coordinate_names(table, name="$q_{{{}}}$", escape=latex_text):
+        lines.append(rf"  \par\medskip {names}")
+    if note := format_factor_units(table, units):
+        lines.append(rf"  \par {note}")
     lines += [line for what, T in poses.items() for line in latex_pose(what, T)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
@@ -320,7 +338,7 @@ def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, 
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
-        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
+        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_travel(table, row))
         if row.mimic is not None and printed_row.mimic is not None:
             multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
             total += multiplier_error * _largest_mimicked_value(table, row) * max(lever, 1.0)

@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from urdfkin.dh.convert import relative_frame_poses
+from urdfkin.dh.convert import make_unique, relative_frame_poses
 from urdfkin.dh.export.code import (
     check_no_mimic,
     docstring_lines,
@@ -27,6 +27,7 @@ from urdfkin.dh.export.code import (
     matrix_lines,
     sanitize,
 )
+from urdfkin.dh.export.data import format_toml_value
 from urdfkin.dh.export.text import latex_math, latex_pose, scale_to_fit
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.structure import axes_and_connecting_vectors
@@ -73,24 +74,24 @@ def write_matlab_rst(table: DHTable) -> str:
         "robot = rigidBodyTree('DataFormat', 'row');",
         f"robot.BaseName = '{sanitize(table.base_frame)}';",
     ]
-    parent = "robot.BaseName"
+    parent, bodies, joints = "robot.BaseName", [sanitize(table.base_frame)], list[str]()
     for row, T in zip(table.rows, poses[:-1], strict=True):
         kind = "revolute" if row.kind.turns else "prismatic"
+        joints.append(make_unique(sanitize(row.joint), joints))
+        bodies.append(make_unique(f"{sanitize(row.joint)}_link", bodies))
         lines += matrix_lines("T", T.tolist(), 4)
         lines += [
-            f"body = rigidBody('{sanitize(row.joint)}_link');",
-            f"joint = rigidBodyJoint('{sanitize(row.joint)}', '{kind}');",
+            f"body = rigidBody('{bodies[-1]}');",
+            f"joint = rigidBodyJoint('{joints[-1]}', '{kind}');",
             "setFixedTransform(joint, T);",
             f"joint.JointAxis = [0 0 {row.sense}];",
         ]
         if limits := format_limits(row):
             lines.append(f"joint.PositionLimits = [{limits}];")
         lines += ["body.Joint = joint;", f"addBody(robot, body, {parent});"]
-        parent = f"'{sanitize(row.joint)}_link'"
-    lines += [
-        *matrix_lines("T", poses[-1].tolist(), 4),
-        f"body = rigidBody('{sanitize(table.tip_frame)}_tip');",
-    ]
+        parent = f"'{bodies[-1]}'"
+    tip = make_unique(f"{sanitize(table.tip_frame)}_tip", bodies)
+    lines += [*matrix_lines("T", poses[-1].tolist(), 4), f"body = rigidBody('{tip}');"]
     lines += ["setFixedTransform(body.Joint, T);", f"addBody(robot, body, {parent});", "end"]
     return "\n".join(lines) + "\n"
 
@@ -203,7 +204,9 @@ def _matlab(screws: ProductOfExponentials) -> str:
 
 
 _EXACT_FORMS: dict[str, Callable[[ProductOfExponentials], str]] = {
-    "toml": lambda screws: "".join(f"{key} = {json.dumps(x)}\n" for key, x in screws.as_mapping().items()),
+    "toml": lambda screws: "".join(
+        f"{key} = {format_toml_value(x)}\n" for key, x in screws.as_mapping().items()
+    ),
     "json": lambda screws: json.dumps(screws.as_mapping(), indent=2) + "\n",
     "numpy": _numpy,
     "matlab": _matlab,
