@@ -4,7 +4,7 @@ import copy
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -288,6 +288,33 @@ def test_a_robot_with_an_overflowing_square_of_a_length_is_refused(compared: Any
         compared(*robots)
 
 
+def with_frames(names: str, frames: Collection[int] = (), frame: str = "fixed") -> Robot:
+    """Return a chain of three joints; a fixed or idle joint precedes the links with these numbers."""
+    parts = list[str]()
+    for i, name in enumerate(names):
+        child = f"m{i + 1}" if i + 1 in frames else f"l{i + 1}"
+        origin = f'xyz="0.{i} 0.1 0.3" rpy="1.57 0.{i} 0"'
+        parts.append(joint(name, "revolute", f"l{i}", child, origin, more=limit()))
+        if child[0] == "m":
+            idle_rule = limit() + mimic(names[0], 0) if frame != "fixed" else ""
+            axis = "" if frame == "fixed" else "0 1 0"
+            parts.append(joint(f"frame{i + 1}", frame, child, f"l{i + 1}", "", axis, idle_rule))
+    return built(*parts)
+
+
+@pytest.mark.parametrize("names", ["abc", "xyz"])
+@pytest.mark.parametrize("frame", ["fixed", "revolute"])
+@pytest.mark.parametrize("frames", [(2,), (1, 2, 3)])
+def test_a_frame_between_a_joint_and_its_link_is_no_difference(
+    names: str, frame: str, frames: Collection[int]
+) -> None:
+    models = with_frames("abc"), with_frames(names, frames, frame)
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.SAME, found.differences
+        assert certified(found, a, b)
+
+
 # -- certificates ------------------------------------------------------------------------------------
 
 
@@ -511,6 +538,17 @@ def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(kind:
         assert recheck(document, a, b) == []
         document["remarks"] = []
         assert recheck(document, a, b) != []
+
+
+@pytest.mark.parametrize(("kind", "what"), [("fixed", "fixed"), ("revolute", "mimic rule")])
+def test_a_joint_that_never_moves_can_be_matched_with_a_moving_joint_by_hand(kind: str, what: str) -> None:
+    still = with_k(kind, limit() + mimic("j", 0) if kind != "fixed" else "")
+    text = with_k("revolute", limit()).urdf.replace('"k"', '"moves"').replace('"c"', '"other"')
+    models = still, urdfkin.load(text)
+    for a, b, names in ((*models, {"k": "moves"}), (*models[::-1], {"moves": "k"})):
+        found = urdfkin.same(a, b, map=names)
+        assert [one.what for one in found.differences] == [what]
+        assert certified(found, a, b)
 
 
 def test_a_mimic_joint_with_multiplier_zero_and_a_joint_fixed_elsewhere_differ_by_a_bounded_angle() -> None:
