@@ -315,6 +315,28 @@ def test_a_frame_between_a_joint_and_its_link_is_no_difference(
         assert certified(found, a, b)
 
 
+def on_a_root(root: str, *more: str) -> Robot:
+    """Return a robot with two legs on the root link."""
+    legs = [
+        joint(name, "revolute", root, link, f'xyz="0 {y} 1"', axis, limit())
+        + joint(f"{name}_knee", "revolute", link, f"{link}_foot", 'xyz="1 0 0"', "0 1 0", limit())
+        for name, link, y, axis in (("j", "b", 0, "0 0 1"), ("k", "c", 1, "1 0 0"))
+    ]
+    return built(*more, *legs)
+
+
+def test_root_links_of_equal_names_are_at_one_place_in_a_comparison_as_written() -> None:
+    displaced = joint("f", "fixed", "w", "a", 'xyz="0.1 0 0" rpy="0 0 0.5"', axis="")
+    models = on_a_root("a"), on_a_root("w", displaced)
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.DIFFERS
+        assert found.up_to == ("base",)
+        assert present(found.as_written).lower > 0.6
+        assert not found.within(0.6)
+        assert certified(found, a, b)
+
+
 # -- certificates ------------------------------------------------------------------------------------
 
 

@@ -22,6 +22,7 @@ from urdfkin.comparison.result import (
     Tool,
     Verdict,
     angle,
+    base_as_written,
     changes_of_b,
     check_joint_names,
     differences,
@@ -667,19 +668,6 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
             for word in spellings(name) & known - set(names):
                 originals.setdefault(word, set()).add(name)
     return {word: own.pop() for word, own in originals.items() if len(own) == 1}
-
-
-def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
-
-    If B's root body has a link with the name of A's root, this link is placed at A's root. If A's root body
-    has a link with the name of B's root, B's root is placed at this link. Otherwise, the roots coincide.
-    """
-    if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
-        return inverse(b.zero_poses[link])
-    if (root := b.labels[0]) in a.labels and not a.body_of[link := a.labels.index(root)]:
-        return a.zero_poses[link]
-    return IDENTITY
 
 
 def parse_joint_pairs(words: tuple[str, ...]) -> dict[str, str]:
