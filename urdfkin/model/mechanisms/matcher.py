@@ -153,6 +153,23 @@ class MechanismMatcher:
         assert best is not None
         return best
 
+    def find_best_with_names(self) -> Alignment:
+        """Return the best alignment that separates no links with equal labels.
+
+        If each alignment separates such links, return one of these alignments.
+        """
+        best: Alignment | None = None
+        self.exact = None
+        for bodies, X in self._start_candidates():
+            alignment = self._match_from(bodies, X)
+            if best is None or (
+                alignment.has_separated_names <= best.has_separated_names
+                and (best.has_separated_names or _is_better_alignment(alignment, best))
+            ):
+                best = alignment
+        assert best is not None
+        return best
+
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
         """Yield the start of each search: two bodies, and the pose (4, 4) of B's root in A's root frame."""
         if self.choices is not None:
@@ -257,6 +274,7 @@ class MechanismMatcher:
         stack = [BodyPair(base, (None, None), -1, IDENTITY, X)]
         while stack:
             body_pair = stack.pop()
+            alignment.bodies[body_pair.bodies[0]] = body_pair.bodies[1]
             self._match_links(body_pair, alignment)
             pairs, only_a, only_b = self._joint_pairs(body_pair)
             alignment.only_a += _joints_in_subtrees(self.a, body_pair.bodies[0], only_a)
@@ -742,6 +760,11 @@ def align(
             b = b.reorder(order)
         return _best_alignment(a, b, name_map, choices)
     best = _best_alignment(a, b, name_map, None, LookAhead(MAX_LOOK_AHEAD_PAIRS))
+    if best.has_separated_names:
+        named = _best_alignment(a, b, name_map, None, LookAhead(MAX_LOOK_AHEAD_PAIRS), separates_names=False)
+        named = _with_refined_axes(named, name_map)
+        if named.is_complete and not named.has_separated_names:
+            best = named
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.is_complete:
             break
@@ -777,9 +800,17 @@ def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
     zeros = zeros_by_mimic_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
-    choices = best.choices
+    choices, X = best.choices, best.X
+    for step in best.steps:
+        name = best.a.tree.joints[step.a].name
+        if step.previous < 0 and name in zeros and _is_compensated_by_base(best, step):
+            # The pose of B's root compensates the change of the zero offset.
+            edge = next(edge for edge in best.b.edges if edge.joint == step.b)
+            screw = _outwards(best.b.screw(edge), edge.outer == best.b.body_of[best.base[1]])
+            change = step.offset - zeros[name][1]
+            X = X @ screw_motion(screw, change, turns=step.kind == "turns")
     candidate = _best_alignment(
-        best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros})
+        best.a, best.b, best.names, replace(choices, X=X, zeros={**choices.zeros, **zeros})
     )
     return (
         candidate
@@ -876,12 +907,13 @@ def _best_alignment(
     look_ahead: LookAhead | None = None,
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
+    *,
+    separates_names: bool = True,
 ) -> Alignment:
     tolerance = tolerance or tolerance_of(a, b)
     joint_matcher = JointMatcher(a, b, name_map, tolerance)
-    return MechanismMatcher(
-        a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base
-    ).find_best()
+    matcher = MechanismMatcher(a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base)
+    return matcher.find_best() if separates_names else matcher.find_best_with_names()
 
 
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
@@ -993,8 +1025,28 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
     return (joint.name, 1.0, 0.0) if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
+def _is_compensated_by_base(alignment: Alignment, step: MatchedJoints) -> bool:
+    """Return whether the pose of B's root can compensate any zero offset of a joint pair.
+
+    Only this joint pair is at the base, and no links with equal labels.
+    """
+    frames = [frame for frame in alignment.frames if frame.previous < 0]
+    names = set(alignment.b.labels)
+    return (
+        step.previous < 0
+        and len(frames) <= 1
+        and not any(alignment.a.labels[frame.a] in names for frame in frames)
+        and all(
+            len(mechanism.edges_by_body[mechanism.body_of[link]]) == 1
+            for mechanism, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
+        )
+    )
+
+
 def _find_effects(alignment: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether later links or axes determine the zero offset of pair i, and `_RulePair.has_effect`."""
+    if _is_compensated_by_base(alignment, alignment.steps[i]):
+        return False, True
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):
