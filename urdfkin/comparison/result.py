@@ -568,7 +568,8 @@ class Sameness(Displayable):
             if not joint.kind.nq or joint.mimic is not None:
                 continue
             one = joints_of_b.get(joint.name)
-            if one is None or tree_a.joints[tree_a.joint_index(one.a)].kind.nq != joint.kind.nq:
+            kind = None if one is None else tree_a.joints[tree_a.joint_index(one.a)].kind
+            if one is None or kind is None or (kind.nq, kind.turns) != (joint.kind.nq, joint.kind.turns):
                 raise InputError(
                     "a joint of B has no matching joint in A",
                     where="map",
