@@ -214,6 +214,18 @@ def test_a_tilted_plane_of_a_planar_joint_is_a_difference() -> None:
     assert certified(found, a, b)
 
 
+def test_a_map_of_all_joints_determines_the_bodies_that_are_matched() -> None:
+    a = built(
+        joint("j", "planar", "base", "cart", 'rpy="0.4 0.1 0"'),
+        joint("k", "revolute", "base", "door", 'xyz="1 0 0"', "0.6 0 0.8", limit()),
+        verify=False,
+    )
+    b = loaded(pairs.on_a_stand(pairs.renamed(a.tree)))
+    moving = {joint.kind: joint.name for joint in b.tree.joints if joint.kind.nv}
+    found = urdfkin.same(a, b, map={one.name: moving[one.kind] for one in a.tree.joints}, bounds=False)
+    assert {one.a for one in found.joints} == {"j", "k"}
+
+
 # -- chains without common names ---------------------------------------------------------------------
 
 

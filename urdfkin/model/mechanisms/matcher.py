@@ -146,7 +146,7 @@ class MechanismMatcher:
         best: Alignment | None = None
         for bodies, X in self._start_candidates():
             alignment = self._match_from(bodies, X)
-            if best is None or _is_better_alignment(alignment, best):
+            if best is None or self._is_better(alignment, best):
                 best, self.match_count = alignment, alignment.match_count
             if not best.max_difference and not (best.only_a and best.only_b):
                 break
@@ -164,7 +164,7 @@ class MechanismMatcher:
             alignment = self._match_from(bodies, X)
             if best is None or (
                 alignment.has_separated_names <= best.has_separated_names
-                and (best.has_separated_names or _is_better_alignment(alignment, best))
+                and (best.has_separated_names or self._is_better(alignment, best))
             ):
                 best = alignment
         assert best is not None
@@ -190,13 +190,20 @@ class MechanismMatcher:
             if start is not None:
                 yield start
         for base in bases:
-            if self._match_count_bound(base) < self.match_count:
+            if not self.joint_matcher.name_map and self._match_count_bound(base) < self.match_count:
                 continue
             tried = list[FloatArray]()
             for X in chain(self._root_poses_by_links(base), self._root_poses_by_axes(base)):
                 if not any(self.tolerance.holds(*pose_difference(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
+
+    def _is_better(self, one: Alignment, than: Alignment) -> bool:
+        mapped = [
+            sum(found.names.get(a) == b for a, b in self.joint_matcher.name_map.items())
+            for found in (one, than)
+        ]
+        return mapped[0] > mapped[1] if mapped[0] != mapped[1] else _is_better_alignment(one, than)
 
     def _match_count_bound(self, base: tuple[int, int]) -> int:
         """Two branches with m and n joints have at most min(m, n) joint pairs.
@@ -279,7 +286,8 @@ class MechanismMatcher:
             pairs, only_a, only_b = self._joint_pairs(body_pair)
             alignment.only_a += _joints_in_subtrees(self.a, body_pair.bodies[0], only_a)
             alignment.only_b += _joints_in_subtrees(self.b, body_pair.bodies[1], only_b)
-            for e, f in pairs:
+            # The order must not depend on how pairs were found, because a recheck finds all pairs by name.
+            for e, f in sorted(pairs, key=lambda pair: pair[0].joint):
                 step, next_pair, _ = self._match_joints(
                     body_pair, e, f, len(alignment.steps), LOOK_AHEAD_DEPTH
                 )
