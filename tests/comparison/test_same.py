@@ -315,6 +315,27 @@ def test_a_frame_between_a_joint_and_its_link_is_no_difference(
         assert certified(found, a, b)
 
 
+def with_tool(turn: str, mount: str, x: float) -> Robot:
+    """Return an arm whose tool is x (m) away from its first link."""
+    return built(
+        joint(turn, "revolute", "base", "arm", more=limit()),
+        joint("elbow", "revolute", "arm", "fore", 'xyz="1 0 1"', "0 1 0", limit()),
+        joint(mount, "fixed", "arm", "tool", f'xyz="{x} 0 0"', axis=""),
+    )
+
+
+def test_a_fixed_joint_with_the_name_of_another_moving_joint_hides_no_tool() -> None:
+    models = with_tool("shoulder", "mount", 1.0), with_tool("turn", "shoulder", 2.0)
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.up_to == ("tools",)
+        assert not found.within(0.5)
+        assert certified(found, a, b)
+    found = urdfkin.same(models[0], with_tool("turn", "shoulder", 1.0))
+    assert found.verdict is Verdict.SAME
+    assert ("tool", "tool") in found.links
+
+
 def on_a_root(root: str, *more: str) -> Robot:
     """Return a robot with two legs on the root link."""
     legs = [
@@ -359,6 +380,22 @@ def test_a_certificate_of_a_robot_and_a_modified_copy_passes_the_recheck(name: s
     a = robot(name)
     b = a if what is None else other(name, what)
     assert certified(urdfkin.same(a, b), a, b)
+
+
+@pytest.mark.parametrize("names", [{"j": "z"}, {"j": "z", "k": "a"}])
+def test_a_certificate_of_branches_with_new_names_passes_the_recheck(names: dict[str, str]) -> None:
+    legs = [
+        joint(name, "revolute", "base", f"{name}_link", f'xyz="{x} 0.2 0"', axis, limit())
+        for name, x, axis in (("j", 0.0, "0 0 1"), ("k", 0.3, "1 0 0"), ("l", 0.7, "0 0.6 0.8"))
+    ]
+    a = built(*legs)
+    text = a.urdf
+    for old, new in names.items():
+        text = text.replace(f'"{old}', f'"{new}')
+    b = urdfkin.load(text)
+    found = urdfkin.same(a, b)
+    assert found
+    assert certified(found, a, b)
 
 
 def confirmed(**changed: Any) -> dict[str, Any]:

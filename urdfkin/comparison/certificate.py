@@ -13,7 +13,6 @@ from urdfkin.comparison.result import Confirmation, ConfirmationState, Differenc
 from urdfkin.comparison.verdict import CONFIRMATION_SAMPLES, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     AlignmentChoices,
@@ -310,7 +309,7 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
     if (error := _choices_error(document, choices, comparator)) is not None:
         yield error
         return
-    alignment = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, choices)
+    alignment = comparator.align({one["a"]: one["b"] for one in document["joints"]}, choices)
     variables = variables_of(alignment, comparator.tolerance)
     result = comparator.result_without_bounds(alignment, variables)
     wrong = list(_statement_errors(document, comparator, result))

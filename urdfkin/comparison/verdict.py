@@ -41,6 +41,7 @@ from urdfkin.model.mechanisms.mechanism import (
     AS_WRITTEN,
     IDENTITY,
     Alignment,
+    AlignmentChoices,
     FramePair,
     MatchedJoints,
     Mechanism,
@@ -212,7 +213,24 @@ class Comparator:
         )
 
     def alignment(self) -> Alignment:
-        return align(*self.mechanisms, {**self.spellings, **self.joint_map})
+        return self.align({**self.spellings, **self.joint_map})
+
+    def align(self, names: Mapping[str, str], choices: AlignmentChoices | None = None) -> Alignment:
+        """Align the models. `names` maps joint names of A to joint names of B.
+
+        A fixed joint without a matching moving joint does not separate bodies. Otherwise, the links after
+        this joint would not be compared. The method merges these bodies in `mechanisms`, and aligns again.
+        """
+        while True:
+            a, b = self.mechanisms
+            found = align(a, b, names, choices)
+            unmatched = (
+                {j for j in found.only_a if not a.tree.joints[j].kind.nv},
+                {j for j in found.only_b if not b.tree.joints[j].kind.nv},
+            )
+            if not any(unmatched):
+                return found
+            self.mechanisms = a.merge(unmatched[0]), b.merge(unmatched[1])
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
         """Return the verdict and the differences. The function also stores the tool frames in `alignment`."""
