@@ -336,6 +336,22 @@ def test_a_fixed_joint_with_the_name_of_another_moving_joint_hides_no_tool() -> 
     assert ("tool", "tool") in found.links
 
 
+@pytest.mark.parametrize("x", [1.0, 2.0])
+def test_two_fixed_joints_with_exchanged_names_of_moving_joints_are_not_free(x: float) -> None:
+    def arm(turn: str, mount: str, x: float) -> Robot:
+        return built(
+            joint(turn, "revolute", "base", "upper", more=limit()),
+            joint(mount, "fixed", "upper", "fore", f'xyz="{x} 0 0"', axis=""),
+            joint("wrist", "revolute", "fore", "hand", 'xyz="1 0 1"', "0 1 0", limit()),
+        )
+
+    a, b = arm("j", "k", 1.0), arm("k", "j", x)
+    found = urdfkin.same(a, b)
+    assert bool(found) is (x == 1.0)
+    assert found.up_to == ()
+    assert certified(found, a, b)
+
+
 def on_a_root(root: str, *more: str) -> Robot:
     """Return a robot with two legs on the root link."""
     legs = [

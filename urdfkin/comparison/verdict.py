@@ -224,13 +224,16 @@ class Comparator:
         while True:
             a, b = self.mechanisms
             found = align(a, b, names, choices)
-            unmatched = (
-                {j for j in found.only_a if not a.tree.joints[j].kind.nv},
-                {j for j in found.only_b if not b.tree.joints[j].kind.nv},
-            )
-            if not any(unmatched):
+            pairs: list[tuple[int | None, int | None]] = [(step.a, step.b) for step in found.steps]
+            pairs += [(i, None) for i in found.only_a] + [(None, j) for j in found.only_b]
+            fixed = [
+                (i, j)
+                for i, j in pairs
+                if (i is None or not a.tree.joints[i].kind.nv) and (j is None or not b.tree.joints[j].kind.nv)
+            ]
+            if not fixed:
                 return found
-            self.mechanisms = a.merge(unmatched[0]), b.merge(unmatched[1])
+            self.mechanisms = a.merge({i for i, _ in fixed}), b.merge({j for _, j in fixed})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
         """Return the verdict and the differences. The function also stores the tool frames in `alignment`."""

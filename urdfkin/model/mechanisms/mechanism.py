@@ -332,11 +332,11 @@ class Mechanism:
         other.orders = (*self.orders, tuple(names))
         return other
 
-    def merge(self, joints: Collection[int]) -> Mechanism:
+    def merge(self, joints: Collection[int | None]) -> Mechanism:
         """Return a mechanism in which the fixed joints with these indices do not separate bodies."""
-        if not joints:
-            return self
         fixed = {edge.joint for edge in self.edges if not self.joint(edge).kind.nv}
+        if fixed.isdisjoint(joints):
+            return self
         return Mechanism(self.tree, fixed - set(joints), self.labels, free_frames=self.free_frames)
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
