@@ -24,6 +24,7 @@ from urdfkin.dh import make_dh_table
 from urdfkin.model.mechanisms import matcher
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.writer import to_urdf
 
 ROBOTS = sorted(catalogue())
 MOVED = [what for what in pairs.UNLIKE if what not in ("other rule", "rounded")]
@@ -213,6 +214,18 @@ def test_a_tilted_plane_of_a_planar_joint_is_a_difference() -> None:
     assert certified(found, a, b)
 
 
+def test_a_map_of_all_joints_determines_the_bodies_that_are_matched() -> None:
+    a = built(
+        joint("j", "planar", "base", "cart", 'rpy="0.4 0.1 0"'),
+        joint("k", "revolute", "base", "door", 'xyz="1 0 0"', "0.6 0 0.8", limit()),
+        verify=False,
+    )
+    b = loaded(pairs.on_a_stand(pairs.renamed(a.tree)))
+    moving = {joint.kind: joint.name for joint in b.tree.joints if joint.kind.nv}
+    found = urdfkin.same(a, b, map={one.name: moving[one.kind] for one in a.tree.joints}, bounds=False)
+    assert {one.a for one in found.joints} == {"j", "k"}
+
+
 # -- chains without common names ---------------------------------------------------------------------
 
 
@@ -292,6 +305,39 @@ def test_branches_after_a_prismatic_joint_need_no_common_names(seed: int) -> Non
     found = urdfkin.same(a, b, bounds=False)
     assert found.verdict is Verdict.SAME_AFTER
     assert moves_alike(found, a, b)
+
+
+# The pose of B's root and the zero offset of the first joint can compensate each other.
+@pytest.mark.parametrize("offset", [0.0, 0.7])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_the_rule_of_a_joint_that_mimics_the_first_joint_fixes_its_zero(kind: str, offset: float) -> None:
+    a = built(
+        joint("j0", kind, "l0", "l1", 'xyz="0.1 0.2 0.3"', "0 0.6 0.8", limit()),
+        joint("j1", "revolute", "l1", "l2", 'xyz="1 0.2 0"', "0 -0.8 0.6", limit() + mimic("j0", 1, 0.3)),
+        joint("j2", "revolute", "l2", "l3", 'xyz="0.2 0.5 0.1"', "1 0 0", limit()),
+        verify=False,
+    )
+    b = loaded(pairs.renamed(pairs.on_a_stand(pairs.with_zeros_moved(a.tree, {"j0": offset}))))
+    found = urdfkin.same(a, b, bounds=False)
+    assert found.verdict is Verdict.SAME_AFTER, found.differences
+    assert moves_alike(found, a, b)
+    assert certified(urdfkin.same(a, b), a, b)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [("revolute", pairs.on_a_stand), ("revolute", pairs.rerooted), ("prismatic", pairs.rerooted)],
+)
+def test_a_robot_with_one_joint_and_only_a_common_tip_is_recognised(kind: str, change: pairs.Change) -> None:
+    a = built(joint("j", kind, "base", "tip", 'xyz="0.3 0 0.1"', "0 0.6 0.8", limit()))
+    tree = change(a.tree)
+    links = {link: link if link == "tip" else f"other_{link}" for link in tree.links}
+    b = urdfkin.load(to_urdf(pairs.with_names(tree, {j.name: j.name for j in tree.joints}, links)))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME_AFTER, found.differences
+    assert ("tip", "tip") in found.links
+    assert "within the bounds" in str(found.confirmation)
+    assert certified(found, a, b)
 
 
 # -- the order of joints -----------------------------------------------------------------------------

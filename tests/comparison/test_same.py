@@ -4,7 +4,7 @@ import copy
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -288,6 +288,92 @@ def test_a_robot_with_an_overflowing_square_of_a_length_is_refused(compared: Any
         compared(*robots)
 
 
+def with_frames(names: str, frames: Collection[int] = (), frame: str = "fixed") -> Robot:
+    """Return a chain of three joints; a fixed or idle joint precedes the links with these numbers."""
+    parts = list[str]()
+    for i, name in enumerate(names):
+        child = f"m{i + 1}" if i + 1 in frames else f"l{i + 1}"
+        origin = f'xyz="0.{i} 0.1 0.3" rpy="1.57 0.{i} 0"'
+        parts.append(joint(name, "revolute", f"l{i}", child, origin, more=limit()))
+        if child[0] == "m":
+            idle_rule = limit() + mimic(names[0], 0) if frame != "fixed" else ""
+            axis = "" if frame == "fixed" else "0 1 0"
+            parts.append(joint(f"frame{i + 1}", frame, child, f"l{i + 1}", "", axis, idle_rule))
+    return built(*parts)
+
+
+@pytest.mark.parametrize("names", ["abc", "xyz"])
+@pytest.mark.parametrize("frame", ["fixed", "revolute"])
+@pytest.mark.parametrize("frames", [(2,), (1, 2, 3)])
+def test_a_frame_between_a_joint_and_its_link_is_no_difference(
+    names: str, frame: str, frames: Collection[int]
+) -> None:
+    models = with_frames("abc"), with_frames(names, frames, frame)
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.SAME, found.differences
+        assert certified(found, a, b)
+
+
+def with_tool(turn: str, mount: str, x: float) -> Robot:
+    """Return an arm whose tool is x (m) away from its first link."""
+    return built(
+        joint(turn, "revolute", "base", "arm", more=limit()),
+        joint("elbow", "revolute", "arm", "fore", 'xyz="1 0 1"', "0 1 0", limit()),
+        joint(mount, "fixed", "arm", "tool", f'xyz="{x} 0 0"', axis=""),
+    )
+
+
+def test_a_fixed_joint_with_the_name_of_another_moving_joint_hides_no_tool() -> None:
+    models = with_tool("shoulder", "mount", 1.0), with_tool("turn", "shoulder", 2.0)
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.up_to == ("tools",)
+        assert not found.within(0.5)
+        assert certified(found, a, b)
+    found = urdfkin.same(models[0], with_tool("turn", "shoulder", 1.0))
+    assert found.verdict is Verdict.SAME
+    assert ("tool", "tool") in found.links
+
+
+@pytest.mark.parametrize("x", [1.0, 2.0])
+def test_two_fixed_joints_with_exchanged_names_of_moving_joints_are_not_free(x: float) -> None:
+    def arm(turn: str, mount: str, x: float) -> Robot:
+        return built(
+            joint(turn, "revolute", "base", "upper", more=limit()),
+            joint(mount, "fixed", "upper", "fore", f'xyz="{x} 0 0"', axis=""),
+            joint("wrist", "revolute", "fore", "hand", 'xyz="1 0 1"', "0 1 0", limit()),
+        )
+
+    a, b = arm("j", "k", 1.0), arm("k", "j", x)
+    found = urdfkin.same(a, b)
+    assert bool(found) is (x == 1.0)
+    assert found.up_to == ()
+    assert certified(found, a, b)
+
+
+def on_a_root(root: str, *more: str) -> Robot:
+    """Return a robot with two legs on the root link."""
+    legs = [
+        joint(name, "revolute", root, link, f'xyz="0 {y} 1"', axis, limit())
+        + joint(f"{name}_knee", "revolute", link, f"{link}_foot", 'xyz="1 0 0"', "0 1 0", limit())
+        for name, link, y, axis in (("j", "b", 0, "0 0 1"), ("k", "c", 1, "1 0 0"))
+    ]
+    return built(*more, *legs)
+
+
+def test_root_links_of_equal_names_are_at_one_place_in_a_comparison_as_written() -> None:
+    displaced = joint("f", "fixed", "w", "a", 'xyz="0.1 0 0" rpy="0 0 0.5"', axis="")
+    models = on_a_root("a"), on_a_root("w", displaced)
+    for a, b in (models, models[::-1]):
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.DIFFERS
+        assert found.up_to == ("base",)
+        assert present(found.as_written).lower > 0.6
+        assert not found.within(0.6)
+        assert certified(found, a, b)
+
+
 # -- certificates ------------------------------------------------------------------------------------
 
 
@@ -310,6 +396,22 @@ def test_a_certificate_of_a_robot_and_a_modified_copy_passes_the_recheck(name: s
     a = robot(name)
     b = a if what is None else other(name, what)
     assert certified(urdfkin.same(a, b), a, b)
+
+
+@pytest.mark.parametrize("names", [{"j": "z"}, {"j": "z", "k": "a"}])
+def test_a_certificate_of_branches_with_new_names_passes_the_recheck(names: dict[str, str]) -> None:
+    legs = [
+        joint(name, "revolute", "base", f"{name}_link", f'xyz="{x} 0.2 0"', axis, limit())
+        for name, x, axis in (("j", 0.0, "0 0 1"), ("k", 0.3, "1 0 0"), ("l", 0.7, "0 0.6 0.8"))
+    ]
+    a = built(*legs)
+    text = a.urdf
+    for old, new in names.items():
+        text = text.replace(f'"{old}', f'"{new}')
+    b = urdfkin.load(text)
+    found = urdfkin.same(a, b)
+    assert found
+    assert certified(found, a, b)
 
 
 def confirmed(**changed: Any) -> dict[str, Any]:
@@ -511,6 +613,17 @@ def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(kind:
         assert recheck(document, a, b) == []
         document["remarks"] = []
         assert recheck(document, a, b) != []
+
+
+@pytest.mark.parametrize(("kind", "what"), [("fixed", "fixed"), ("revolute", "mimic rule")])
+def test_a_joint_that_never_moves_can_be_matched_with_a_moving_joint_by_hand(kind: str, what: str) -> None:
+    still = with_k(kind, limit() + mimic("j", 0) if kind != "fixed" else "")
+    text = with_k("revolute", limit()).urdf.replace('"k"', '"moves"').replace('"c"', '"other"')
+    models = still, urdfkin.load(text)
+    for a, b, names in ((*models, {"k": "moves"}), (*models[::-1], {"moves": "k"})):
+        found = urdfkin.same(a, b, map=names)
+        assert [one.what for one in found.differences] == [what]
+        assert certified(found, a, b)
 
 
 def test_a_mimic_joint_with_multiplier_zero_and_a_joint_fixed_elsewhere_differ_by_a_bounded_angle() -> None:

@@ -13,7 +13,6 @@ from urdfkin.comparison.result import Confirmation, ConfirmationState, Differenc
 from urdfkin.comparison.verdict import CONFIRMATION_SAMPLES, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     AlignmentChoices,
@@ -297,8 +296,9 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
                 found=f"SHA-256 {robot.sha256[:12]}..., not {str(*claimed)[:12]}...",
                 remedy="compare the models again: urdfkin same A B",
             )
+    joint_map = {one["a"]: one["b"] for one in document["joints"]}
     try:
-        return list(_errors(document, Comparator((a, b), {}, bounds=True)))
+        return list(_errors(document, Comparator((a, b), joint_map, bounds=True)))
     except UnknownNameError as error:
         raise InputError(
             "the certificate names a joint or link that one of the models does not have", found=str(error)
@@ -310,7 +310,7 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
     if (error := _choices_error(document, choices, comparator)) is not None:
         yield error
         return
-    alignment = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, choices)
+    alignment = comparator.align({one["a"]: one["b"] for one in document["joints"]}, choices)
     variables = variables_of(alignment, comparator.tolerance)
     result = comparator.result_without_bounds(alignment, variables)
     wrong = list(_statement_errors(document, comparator, result))
@@ -326,8 +326,9 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
             yield from _interval_errors(search, frame, claim, result.rounding, use_branch_and_bound=not wrong)
     yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
     if document["verdict"] == Verdict.DIFFERS.value and not wrong:
-        other = comparator.alignment()
-        better = comparator.result_without_bounds(other, variables_of(other, comparator.tolerance)).verdict
+        free = Comparator(comparator.robots, {}, bounds=True)
+        other = free.alignment()
+        better = free.result_without_bounds(other, variables_of(other, free.tolerance)).verdict
         if better is not Verdict.DIFFERS:
             yield f"`verdict`: another alignment of B with A gives {better.value}, not differs"
     if result.after:

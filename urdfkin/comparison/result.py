@@ -31,7 +31,7 @@ from urdfkin.model.mechanisms.mechanism import (
     pose_difference,
     tolerance_of,
 )
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic, inverse
 from urdfkin.system.lazy_import import get_hook
 
 if TYPE_CHECKING:
@@ -568,7 +568,8 @@ class Sameness(Displayable):
             if not joint.kind.nq or joint.mimic is not None:
                 continue
             one = joints_of_b.get(joint.name)
-            if one is None or tree_a.joints[tree_a.joint_index(one.a)].kind.nq != joint.kind.nq:
+            kind = None if one is None else tree_a.joints[tree_a.joint_index(one.a)].kind
+            if one is None or kind is None or (kind.nq, kind.turns) != (joint.kind.nq, joint.kind.turns):
                 raise InputError(
                     "a joint of B has no matching joint in A",
                     where="map",
@@ -656,6 +657,19 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
         raise InputError(f"a joint of {which} occurs twice", where="map", found=repr(double))
 
 
+def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
+    """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
+
+    If B's root body has a link with the name of A's root, this link is placed at A's root. If A's root body
+    has a link with the name of B's root, B's root is placed at this link. Otherwise, the roots coincide.
+    """
+    if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
+        return inverse(b.zero_poses[link])
+    if (root := b.labels[0]) in a.labels and not a.body_of[link := a.labels.index(root)]:
+        return a.zero_poses[link]
+    return IDENTITY
+
+
 def changes_of_b(alignment: Alignment, rounding: Tolerance) -> tuple[tuple[str, str], ...]:
     """Return the kind and the text of each change in `Sameness.after`, and store tool poses in `alignment`.
 
@@ -673,7 +687,8 @@ def changes_of_b(alignment: Alignment, rounding: Tolerance) -> tuple[tuple[str, 
             lines.append(
                 ("base", f"{which}'s root is {root}; the joints between {base} and this root are reversed")
             )
-    if alignment.X is not IDENTITY:
+    written = pose_difference(base_as_written(alignment.a, alignment.b), alignment.X)
+    if alignment.X is not IDENTITY or not rounding.holds(*written):
         lines.append(
             ("base", f"the pose of B's root in A's root frame is {pose_words(alignment.X, rounding)}")
         )

@@ -22,6 +22,7 @@ from urdfkin.comparison.result import (
     Tool,
     Verdict,
     angle,
+    base_as_written,
     changes_of_b,
     check_joint_names,
     differences,
@@ -40,6 +41,7 @@ from urdfkin.model.mechanisms.mechanism import (
     AS_WRITTEN,
     IDENTITY,
     Alignment,
+    AlignmentChoices,
     FramePair,
     MatchedJoints,
     Mechanism,
@@ -168,8 +170,8 @@ class Comparator:
             _fix_idle_mimic_joints(b, a, _swap_pairs(names), swapped),
         )
         separating_joints = (
-            _joints_fixed_in_one(*trees, self.spellings, labels),
-            _joints_fixed_in_one(*trees[::-1], _swap_pairs(self.spellings), swapped),
+            _joints_fixed_in_one(*trees, names, labels),
+            _joints_fixed_in_one(*trees[::-1], _swap_pairs(names), swapped),
         )
         is_table = [bool(robot.origin.table) for robot in robots]
         self.mechanisms = (
@@ -211,7 +213,27 @@ class Comparator:
         )
 
     def alignment(self) -> Alignment:
-        return align(*self.mechanisms, {**self.spellings, **self.joint_map})
+        return self.align({**self.spellings, **self.joint_map})
+
+    def align(self, names: Mapping[str, str], choices: AlignmentChoices | None = None) -> Alignment:
+        """Align the models. `names` maps joint names of A to joint names of B.
+
+        A fixed joint without a matching moving joint does not separate bodies. Otherwise, the links after
+        this joint would not be compared. The method merges these bodies in `mechanisms`, and aligns again.
+        """
+        while True:
+            a, b = self.mechanisms
+            found = align(a, b, names, choices)
+            pairs: list[tuple[int | None, int | None]] = [(step.a, step.b) for step in found.steps]
+            pairs += [(i, None) for i in found.only_a] + [(None, j) for j in found.only_b]
+            fixed = [
+                (i, j)
+                for i, j in pairs
+                if (i is None or not a.tree.joints[i].kind.nv) and (j is None or not b.tree.joints[j].kind.nv)
+            ]
+            if not fixed:
+                return found
+            self.mechanisms = a.merge({i for i, _ in fixed}), b.merge({j for _, j in fixed})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
         """Return the verdict and the differences, and store the tool frames in `alignment`."""
@@ -552,20 +574,11 @@ def _joints_fixed_in_one(
 ) -> set[int]:
     """Return the indices of the fixed joints of `tree` that move in `other_tree`.
 
-    Joints match by their names, translated by `names`, or by the labels of their child links.
+    `names` maps joint names of `tree` to names of `other_tree`.
     """
-    moving = {joint.name for joint in other_tree.joints if joint.kind.nv}
-    ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
-    children = {
-        labels[1][i + 1]
-        for i, joint in enumerate(other_tree.joints)
-        if joint.kind.nv and joint.name not in ours
-    }
-    return {
-        i
-        for i, joint in enumerate(tree.joints)
-        if not joint.kind.nv and (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
-    }
+    moves = tuple([joint.kind.nv > 0 for joint in one.joints] for one in (tree, other_tree))
+    matching = _joints_with_moving_match((tree, other_tree), moves, names, labels)
+    return {i for i in matching if not tree.joints[i].kind.nv}
 
 
 def _fix_idle_mimic_joints(
@@ -575,17 +588,63 @@ def _fix_idle_mimic_joints(
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
     """Fix mimic joints with multiplier 0 at their offsets, unless the matching joint moves."""
-    moves = [joint.kind.nv > 0 and not _is_idle_mimic_joint(joint) for joint in other_tree.joints]
-    moving = {joint.name for joint, moved in zip(other_tree.joints, moves, strict=True) if moved}
-    children = {labels[1][i + 1] for i, moved in enumerate(moves) if moved}
+    moves = tuple(
+        [joint.kind.nv > 0 and not _is_idle_mimic_joint(joint) for joint in one.joints]
+        for one in (tree, other_tree)
+    )
+    matching = _joints_with_moving_match((tree, other_tree), moves, names, labels)
     joints = tuple(
-        Lock(joint, 0.0).make_fixed_joint()
-        if _is_idle_mimic_joint(joint)
-        and not (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
-        else joint
+        Lock(joint, 0.0).make_fixed_joint() if _is_idle_mimic_joint(joint) and i not in matching else joint
         for i, joint in enumerate(tree.joints)
     )
     return tree if joints == tree.joints else replace(tree, joints=joints)
+
+
+def _joints_with_moving_match(
+    trees: tuple[KinematicTree, KinematicTree],
+    moves: tuple[Sequence[bool], ...],
+    names: Mapping[str, str],
+    labels: tuple[Sequence[str], Sequence[str]],
+) -> set[int]:
+    """Return the indices of the joints of the first tree that match a moving joint of the second tree.
+
+    Joints match by their names or by their child links. Moving joints with equal names do not match other
+    joints by their child links.
+    """
+    own, other = ([joint.name for joint in tree.joints] for tree in trees)
+    own = [names.get(name, name) for name in own]
+    moving = tuple(
+        {name for name, moved in zip(one, flags, strict=True) if moved}
+        for one, flags in zip((own, other), moves, strict=True)
+    )
+    children = {
+        labels[1][i + 1]: i for i, moved in enumerate(moves[1]) if moved and other[i] not in moving[0]
+    }
+    links_of_other = {label: link for link, label in enumerate(labels[1])}
+    as_many = len(moving[0] - moving[1]) >= len(moving[1] - moving[0])
+
+    def follows_match(i: int, match: int) -> bool:
+        """Return whether an earlier moving joint of the first tree can match the joint `match`.
+
+        The joint `i` is then an additional joint between the moving joint and the link.
+        """
+        link = trees[0].joints[i].parent
+        while True:
+            same = links_of_other.get(labels[0][link])
+            if same is not None and match not in trees[1].path(same):
+                return False
+            if not link:
+                return False
+            if moves[0][link - 1]:
+                return as_many and own[link - 1] not in moving[1]
+            link = trees[0].joints[link - 1].parent
+
+    return {
+        i
+        for i, name in enumerate(own)
+        if name in moving[1]
+        or ((match := children.get(labels[0][i + 1])) is not None and not follows_match(i, match))
+    }
 
 
 def _is_idle_mimic_joint(joint: Joint) -> bool:
@@ -621,19 +680,6 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
             for word in spellings(name) & known - set(names):
                 originals.setdefault(word, set()).add(name)
     return {word: own.pop() for word, own in originals.items() if len(own) == 1}
-
-
-def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
-
-    A's root coincides with the link of the same name on B's root body. Without this link, B's root coincides
-    with the link of the same name on A's root body. Without both links, the roots coincide.
-    """
-    if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
-        return inverse(b.zero_poses[link])
-    if (root := b.labels[0]) in a.labels and not a.body_of[link := a.labels.index(root)]:
-        return a.zero_poses[link]
-    return IDENTITY
 
 
 def parse_joint_pairs(words: tuple[str, ...]) -> dict[str, str]:

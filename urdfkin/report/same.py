@@ -17,10 +17,10 @@ from urdfkin.comparison.result import (
     SameQuestion,
     Verdict,
     angle,
+    base_as_written,
     interval_text,
     length,
 )
-from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument, format_count
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import MIN_DIVISOR

@@ -598,6 +598,15 @@ def test_a_coordinate_of_only_one_model_is_an_error_that_names_the_joint() -> No
         urdfkin.same(a, shorter, bounds=False).convention()
 
 
+def test_no_convention_converts_an_angle_to_a_length() -> None:
+    a = arm_with()
+    sliding = urdfkin.load(
+        a.urdf.replace('name="b" type="revolute"', 'name="b" type="prismatic"'), verify=False
+    )
+    with pytest.raises(InputError, match=r"a joint of B has no matching joint in A.*found b"):
+        urdfkin.same(a, sliding, bounds=False).convention()
+
+
 def test_a_floating_joint_with_different_frames_in_two_models_is_an_error() -> None:
     a, b = (built(joint("f", "floating", "l0", "l1", f'xyz="{x} 0 0"', "")) for x in (0, 1))
     with pytest.raises(InputError, match="the frames of a planar or floating joint in A and B differ"):

@@ -134,10 +134,27 @@ class MechanismMatcher:
         best: Alignment | None = None
         for bodies, X in self._start_candidates():
             alignment = self._match_from(bodies, X)
-            if best is None or _is_better_alignment(alignment, best):
+            if best is None or self._is_better(alignment, best):
                 best, self.match_count = alignment, alignment.match_count
             if not best.max_difference and not (best.only_a and best.only_b):
                 break
+        assert best is not None
+        return best
+
+    def find_best_with_names(self) -> Alignment:
+        """Return the best alignment that separates no links with equal labels.
+
+        If each alignment separates such links, return one of these alignments.
+        """
+        best: Alignment | None = None
+        self.exact = None
+        for bodies, X in self._start_candidates():
+            alignment = self._match_from(bodies, X)
+            if best is None or (
+                alignment.has_separated_names <= best.has_separated_names
+                and (best.has_separated_names or self._is_better(alignment, best))
+            ):
+                best = alignment
         assert best is not None
         return best
 
@@ -161,13 +178,20 @@ class MechanismMatcher:
             if start is not None:
                 yield start
         for base in bases:
-            if self._match_count_bound(base) < self.match_count:
+            if not self.joint_matcher.name_map and self._match_count_bound(base) < self.match_count:
                 continue
             tried = list[FloatArray]()
             for X in chain(self._root_poses_by_links(base), self._root_poses_by_axes(base)):
                 if not any(self.tolerance.holds(*pose_difference(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
+
+    def _is_better(self, one: Alignment, than: Alignment) -> bool:
+        mapped = [
+            sum(found.names.get(a) == b for a, b in self.joint_matcher.name_map.items())
+            for found in (one, than)
+        ]
+        return mapped[0] > mapped[1] if mapped[0] != mapped[1] else _is_better_alignment(one, than)
 
     def _match_count_bound(self, base: tuple[int, int]) -> int:
         """Two branches with m and n joints have at most min(m, n) joint pairs.
@@ -245,11 +269,13 @@ class MechanismMatcher:
         stack = [BodyPair(base, (None, None), -1, IDENTITY, X)]
         while stack:
             body_pair = stack.pop()
+            alignment.bodies[body_pair.bodies[0]] = body_pair.bodies[1]
             self._match_links(body_pair, alignment)
             pairs, only_a, only_b = self._joint_pairs(body_pair)
             alignment.only_a += _joints_in_subtrees(self.a, body_pair.bodies[0], only_a)
             alignment.only_b += _joints_in_subtrees(self.b, body_pair.bodies[1], only_b)
-            for e, f in pairs:
+            # The order must not depend on how pairs were found, because a recheck finds all pairs by name.
+            for e, f in sorted(pairs, key=lambda pair: pair[0].joint):
                 step, next_pair, _ = self._match_joints(
                     body_pair, e, f, len(alignment.steps), LOOK_AHEAD_DEPTH
                 )
@@ -721,6 +747,11 @@ def align(
             b = b.reorder(order)
         return _best_alignment(a, b, name_map, choices)
     best = _best_alignment(a, b, name_map, None, LookAhead(MAX_LOOK_AHEAD_PAIRS))
+    if best.has_separated_names:
+        named = _best_alignment(a, b, name_map, None, LookAhead(MAX_LOOK_AHEAD_PAIRS), separates_names=False)
+        named = _with_refined_axes(named, name_map)
+        if named.is_complete and not named.has_separated_names:
+            best = named
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.is_complete:
             break
@@ -756,9 +787,17 @@ def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
     zeros = zeros_by_mimic_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
-    choices = best.choices
+    choices, X = best.choices, best.X
+    for step in best.steps:
+        name = best.a.tree.joints[step.a].name
+        if step.previous < 0 and name in zeros and _is_compensated_by_base(best, step):
+            # The pose of B's root compensates the change of the zero offset.
+            edge = next(edge for edge in best.b.edges if edge.joint == step.b)
+            screw = _outwards(best.b.screw(edge), edge.outer == best.b.body_of[best.base[1]])
+            change = step.offset - zeros[name][1]
+            X = X @ screw_motion(screw, change, turns=step.kind == "turns")
     candidate = _best_alignment(
-        best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros})
+        best.a, best.b, best.names, replace(choices, X=X, zeros={**choices.zeros, **zeros})
     )
     return (
         candidate
@@ -852,12 +891,13 @@ def _best_alignment(
     look_ahead: LookAhead | None = None,
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
+    *,
+    separates_names: bool = True,
 ) -> Alignment:
     tolerance = tolerance or tolerance_of(a, b)
     joint_matcher = JointMatcher(a, b, name_map, tolerance)
-    return MechanismMatcher(
-        a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base
-    ).find_best()
+    matcher = MechanismMatcher(a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base)
+    return matcher.find_best() if separates_names else matcher.find_best_with_names()
 
 
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
@@ -965,8 +1005,28 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
     return (joint.name, 1.0, 0.0) if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
+def _is_compensated_by_base(alignment: Alignment, step: MatchedJoints) -> bool:
+    """Return whether the pose of B's root can compensate any zero offset of a joint pair.
+
+    Only this joint pair is at the base, and no links with equal labels.
+    """
+    frames = [frame for frame in alignment.frames if frame.previous < 0]
+    names = set(alignment.b.labels)
+    return (
+        step.previous < 0
+        and len(frames) <= 1
+        and not any(alignment.a.labels[frame.a] in names for frame in frames)
+        and all(
+            len(mechanism.edges_by_body[mechanism.body_of[link]]) == 1
+            for mechanism, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
+        )
+    )
+
+
 def _find_effects(alignment: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether later links or axes determine the zero offset of pair i, and `_RulePair.has_effect`."""
+    if _is_compensated_by_base(alignment, alignment.steps[i]):
+        return False, True
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

@@ -319,6 +319,13 @@ class Mechanism:
         other.orders = (*self.orders, tuple(names))
         return other
 
+    def merge(self, joints: Collection[int | None]) -> Mechanism:
+        """Return a mechanism in which the fixed joints with these indices do not separate bodies."""
+        fixed = {edge.joint for edge in self.edges if not self.joint(edge).kind.nv}
+        if fixed.isdisjoint(joints):
+            return self
+        return Mechanism(self.tree, fixed - set(joints), self.labels, free_frames=self.free_frames)
+
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
         """Return whether the robot moves in the same way with its joints in the order `names`.
 
@@ -553,6 +560,7 @@ class Alignment:
         base: Indices of the links of A and B where the search started.
         X: (4, 4) pose of B's root in A's root frame.
         steps: Joint pairs, outwards from the base.
+        bodies: Body of B by matched body of A.
         match_count: Number of joint pairs and link pairs that agree.
         max_difference: Largest difference of a joint pair or link pair, m. A difference is
             tilt * size_of + shift.
@@ -566,6 +574,7 @@ class Alignment:
     frames: list[FramePair] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
     only_b: list[int] = field(default_factory=list)
+    bodies: dict[int, int] = field(default_factory=dict)
     match_count: int = 0
     max_difference: float = 0.0
 
@@ -574,6 +583,18 @@ class Alignment:
         """Whether all joints are matched, and all matched joints and links agree."""
         alike = not any(step.kind_difference for step in self.steps)
         return alike and not (self.max_difference or self.only_a or self.only_b)
+
+    @property
+    def has_separated_names(self) -> bool:
+        """Whether two links with equal labels are on matched bodies, but not on the same pair of bodies."""
+        links_b = {label: link for link, label in enumerate(self.b.labels)}
+        bodies = (
+            (self.a.body_of[link], self.b.body_of[links_b[label]])
+            for link, label in enumerate(self.a.labels)
+            if label in links_b
+        )
+        matched = set(self.bodies.values())
+        return any(a in self.bodies and b in matched and self.bodies[a] != b for a, b in bodies)
 
     @property
     def has_free_frames(self) -> bool:
