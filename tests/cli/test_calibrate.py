@@ -106,9 +106,8 @@ def test_a_csv_of_poses_may_omit_a_floating_base_but_no_value_of_a_joint_that_mi
         path = tmp_path / "poses.csv"
         np.savetxt(path, rows, "%.17g", ",", header=",".join([*joints, *matrices]), comments="")
         words = "--tip", "tip", "--base", "a", "--root-joint", "floating", "--poses", str(path)
-        return urdfkin(
-            "calibrate", f"{tmp_path}/arm.urdf", *words, *(["--convention", convention] * bool(convention))
-        )
+        how = () if convention is None else ("--convention", convention)
+        return urdfkin("calibrate", f"{tmp_path}/arm.urdf", *words, *how)
 
     short = calibrated("two", "one")
     if convention is None:

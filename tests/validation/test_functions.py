@@ -447,8 +447,14 @@ def test_the_diagnosis_of_a_robot_with_mimic_joints_uses_the_options_of_the_quan
         whole[names] = q
         return free.relative_placement(whole, "panda_rightfinger", "panda_link5")
 
-    options = {"frame": "panda_rightfinger", "relative_to": "panda_link5", "samples": 5}
-    found = verify_function(without_mimic, robot, "relative placement", **options)
+    found = verify_function(
+        without_mimic,
+        robot,
+        "relative placement",
+        frame="panda_rightfinger",
+        relative_to="panda_link5",
+        samples=5,
+    )
     check_diagnosis(found, "the mimic joints ('panda_finger_joint2') do not move")
 
 
