@@ -322,7 +322,7 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
     if not isinstance(source, str) or not is_usd(source):
         return source
-    return load_robot(source, **loading, **usd, lock={}, joints=None)
+    return load_robot(str(source), **loading, **usd, lock={}, joints=None)
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
