@@ -146,6 +146,8 @@ MISTAKES = {
     "verify f.py ur5 --timeout 3": "--timeout does nothing without --program",
     "vectors write v ur5 --no-catalogue": "--catalogue/--no-catalogue does nothing with a ROBOT",
     "report r.json --cases --html r.html": "does nothing if the report is written to a file",
+    "structure ur5 --opw 1 -o s.json": "s.json: --opw writes YAML; use the suffix .txt",
+    "structure ur5 --opw 1 -o s.md": "s.md: --opw writes YAML",
     "validate - -": "only one of the robots can come from standard input",
     "validate ur5 --variant size=big": "--variant does nothing without a USD file",
     "validate ur5 --articulation /arm": "--articulation does nothing without a USD file",

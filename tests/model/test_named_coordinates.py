@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import shlex
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests import urdfs
+from tests.cli.running import good
 from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint, limit, mimic
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
@@ -18,6 +20,7 @@ from urdfkin.errors.numbers import parse_quantity, radians_from_degrees
 from urdfkin.model.configuration import coordinate_layout
 from urdfkin.model.configuration_like import CoordinateLayout
 from urdfkin.robot import Robot
+from urdfkin.urdf.catalogue import catalogue
 
 #: The limits of echo narrow those of elbow, which a test relies on.
 pytestmark = pytest.mark.filterwarnings("ignore:.*URDF527")
@@ -381,3 +384,15 @@ def test_names_with_special_characters_are_found_by_both() -> None:
         robot.placement(written, "e")
     assert robot.certificate().verified
     assert urdfkin.load(ALIKE).placement({"a:x": 0.1, "a:y": 0.2, "a:angle": 0.3, "a.x": 0.4}, "s").any()
+
+
+@pytest.mark.parametrize("name", ["upper arm", "arm,1", "a=b", "turn 1 = x"])
+def test_the_name_of_a_single_locked_joint_may_contain_blanks_commas_and_equals_signs(name: str) -> None:
+    path = catalogue()["planar_two_link"].path
+    text = path.read_text("utf-8").replace('"joint_1"', f'"{name}"')
+    locked = urdfkin.load(text, lock=f"{name}=0.5")
+    assert locked.origin.lock == ((name, 0.5),)
+    q = urdfkin.load(text, joints=[name])
+    assert q.placement(f" {name} = 30deg ", "tip").tolist() == q.placement([math.pi / 6], "tip").tolist()
+    line = shlex.split(locked.origin.command_line_options)
+    assert good("info", "-", *line, stdin=text).text.count("locked at 0.5") == 1

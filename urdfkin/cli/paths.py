@@ -197,7 +197,12 @@ def structure_command(
     from urdfkin.verify.conversions import check_opw, check_screws
 
     if opw is not None:
-        reject_unused_options(click.get_current_context(), ("format_",), "with --opw")
+        context = click.get_current_context()
+        reject_unused_options(context, ("format_",), "with --opw")
+        if context.params["format_"] != "table":
+            raise InputError(
+                "--opw writes YAML", where=str(context.params["output"]), remedy="use the suffix .txt"
+            )
     loaded = load_robot(robot, verify=verify)
     if opw is None:
         screws = loaded.screws(tip, base, verify=False)

@@ -72,7 +72,7 @@ class CoordinateLayout:
 with 'neutral, elbow=...'
         """
         where = where or self.symbol
-        if not isinstance(value, Mapping) and self._is_in_order(cells := _split_cells(value)):
+        if not isinstance(value, Mapping) and self._is_in_order(cells := self._split(value)):
             return self._parse_in_order(cells, where)
         values, pose = self.parse_by_name(value, where)
         return self._combine_values(values, where, pose)
@@ -87,7 +87,7 @@ with 'neutral, elbow=...'
         """
         if isinstance(value, Mapping):
             return dict(value), None
-        cells, pose = _split_cells(value), None
+        cells, pose = self._split(value), None
         if not cells:
             return {}, None
         if self._is_in_order(cells):
@@ -105,6 +105,11 @@ with 'neutral, elbow=...'
                 )
             values[name] = number
         return values, pose
+
+    def _split(self, text: str) -> list[str]:
+        """Split a text into cells. A name may contain blanks and commas if the text has only this name."""
+        name, _, _ = text.rpartition("=")
+        return [text.strip()] if name.strip() in self.names else _split_cells(text)
 
     @staticmethod
     def _is_in_order(cells: Sequence[str]) -> bool:
