@@ -514,6 +514,17 @@ def test_a_printed_table_with_mimic_joints_and_misleading_names_is_read(form: st
     assert {name: getattr(again, name) for name in names} == names
 
 
+@pytest.mark.parametrize(("form", "suffix"), [("terminal", ".txt"), ("markdown", ".md"), ("latex", ".tex")])
+def test_a_text_with_two_tables_is_refused(form: str, suffix: str) -> None:
+    # The base of the second table must not become the base of the first table.
+    one, two = (
+        table_from_rows([[1, 0, 0, 0]], "standard", base=base)
+        for base in (None, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+    )
+    with pytest.raises(InputError, match="header: the text contains more than one table"):
+        table_from_text(f"{export(one, form)}\n{export(two, form)}", suffix)
+
+
 def test_a_joint_variable_in_d_adds_the_offset_to_d() -> None:
     text = "convention: standard\n\na | alpha | d | theta | offset\n0 | 0 | q1 | 0 | 0.05\n"
     assert table_from_text(text, ".md").rows[0].cells == (0.0, 0.0, 0.05, 0.0, 0.0)

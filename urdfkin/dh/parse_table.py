@@ -160,9 +160,20 @@ def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: s
             rows.append(cells)
         else:
             end = len(lines)
+        if any(_parse_columns(split(other)) for other in lines[end:]):
+            raise _second_table_error(line)
         others, decimal_commas = [*lines[:k], *lines[end:]], separator in (";", "\t", "|")
         return _Grid(columns, rows, others, decimal_commas, separator == ",")
     return None
+
+
+def _second_table_error(heading: str) -> InputError:
+    return InputError(
+        "the text contains more than one table",
+        where="header",
+        found=f"a second heading with {', '.join(COLUMNS)} below {safe_repr(heading.strip())}",
+        remedy="write each table into its own file",
+    )
 
 
 def _missing_header_error(lines: list[str]) -> InputError:
@@ -199,6 +210,8 @@ def _parse_latex(lines: list[str]) -> _Grid | None:
     grid = _find_grid(
         [row for row in rows if row], lambda row: [cell.strip() for cell in re.split(r"(?<!\\)&", row)]
     )
+    if grid is not None and _parse_latex(text[found.end() :].splitlines()):
+        raise _second_table_error(" & ".join(column.heading for column in grid.columns))
     other_lines = (text[: found.start()] + text[found.end() :]).splitlines()
     return grid and _Grid(grid.columns, grid.rows, other_lines)
 
