@@ -525,6 +525,19 @@ def test_a_text_with_two_tables_is_refused(form: str, suffix: str) -> None:
         table_from_text(f"{export(one, form)}\n{export(two, form)}", suffix)
 
 
+@pytest.mark.parametrize(
+    ("variable", "kind", "sense"),
+    [("d3", "P", 1), ("$-d_3$", "P", -1), ("θ₃*", "R", 1), ("−q3", "R", -1), (r"$\theta_{3}$", "R", 1)],
+)
+def test_a_column_of_variables_states_kind_and_sense(variable: str, kind: str, sense: int) -> None:
+    head = "standard DH\n\n| a | α | d | θ | Variable |\n|---|---|---|---|---|\n"
+    text = f"{head}| 0 | 0 | 0.1 | 0 | {variable} |\n"
+    row = table_from_text(text, ".md").rows[0]
+    assert (row.kind.turns, row.sense, row.d) == (kind == "R", sense, 0.1)
+    with pytest.raises(InputError, match="row 1, variable: this is not a joint variable: found 'x'"):
+        table_from_text(text.replace(variable, "x"), ".md")
+
+
 def test_a_joint_variable_in_d_adds_the_offset_to_d() -> None:
     text = "convention: standard\n\na | alpha | d | theta | offset\n0 | 0 | q1 | 0 | 0.05\n"
     assert table_from_text(text, ".md").rows[0].cells == (0.0, 0.0, 0.05, 0.0, 0.0)
