@@ -549,6 +549,12 @@ def test_an_offset_without_a_unit_has_the_unit_of_the_column_theta(theta: str) -
     assert table_from_text(text, ".md").rows[0].theta == math.radians(15.0 if "10" in theta else 5.0)
 
 
+@pytest.mark.parametrize("heading", ["offset", "θ offset", "theta_offset"])
+def test_a_column_of_offsets_is_added_to_theta(heading: str) -> None:
+    text = f"standard DH\n\na | alpha | d | theta | {heading} [deg]\n0 | 0 | 0 | q1 | 90\n"
+    assert table_from_text(text, ".md").rows[0].theta == math.pi / 2
+
+
 def test_a_printed_pose_is_in_metres_also_in_a_table_in_millimetres() -> None:
     text = "lengths: mm\nconvention: standard\n\na | alpha | d | theta\n0 | 0 | 100 | q1\n"
     pose = "base (metres):\n  1  0  0  0.5\n  0  1  0  0\n  0  0  1  0.1\n"

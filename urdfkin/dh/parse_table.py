@@ -49,7 +49,7 @@ _NAMES = {
     **dict.fromkeys(("d", "link offset"), "d"),
     **dict.fromkeys(("theta", "joint angle", "angle"), "theta"),
     "beta": "beta",
-    "offset": "offset",
+    **dict.fromkeys(("offset", "theta offset", "theta_offset"), "offset"),
     **dict.fromkeys(("joint", "name", "joint name"), "joint"),
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
     **dict.fromkeys(("variable", "joint variable"), "variable"),
