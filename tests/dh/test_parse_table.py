@@ -514,6 +514,30 @@ def test_a_printed_table_with_mimic_joints_and_misleading_names_is_read(form: st
     assert {name: getattr(again, name) for name in names} == names
 
 
+@pytest.mark.parametrize(("form", "suffix"), [("terminal", ".txt"), ("markdown", ".md"), ("latex", ".tex")])
+def test_a_text_with_two_tables_is_refused(form: str, suffix: str) -> None:
+    # The base of the second table must not become the base of the first table.
+    one, two = (
+        table_from_rows([[1, 0, 0, 0]], "standard", base=base)
+        for base in (None, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+    )
+    with pytest.raises(InputError, match="header: the text contains more than one table"):
+        table_from_text(f"{export(one, form)}\n{export(two, form)}", suffix)
+
+
+@pytest.mark.parametrize(
+    ("variable", "kind", "sense"),
+    [("d3", "P", 1), ("$-d_3$", "P", -1), ("θ₃*", "R", 1), ("−q3", "R", -1), (r"$\theta_{3}$", "R", 1)],
+)
+def test_a_column_of_variables_states_kind_and_sense(variable: str, kind: str, sense: int) -> None:
+    head = "standard DH\n\n| a | α | d | θ | Variable |\n|---|---|---|---|---|\n"
+    text = f"{head}| 0 | 0 | 0.1 | 0 | {variable} |\n"
+    row = table_from_text(text, ".md").rows[0]
+    assert (row.kind.turns, row.sense, row.d) == (kind == "R", sense, 0.1)
+    with pytest.raises(InputError, match="row 1, variable: this is not a joint variable: found 'x'"):
+        table_from_text(text.replace(variable, "x"), ".md")
+
+
 def test_a_joint_variable_in_d_adds_the_offset_to_d() -> None:
     text = "convention: standard\n\na | alpha | d | theta | offset\n0 | 0 | q1 | 0 | 0.05\n"
     assert table_from_text(text, ".md").rows[0].cells == (0.0, 0.0, 0.05, 0.0, 0.0)
@@ -523,6 +547,12 @@ def test_a_joint_variable_in_d_adds_the_offset_to_d() -> None:
 def test_an_offset_without_a_unit_has_the_unit_of_the_column_theta(theta: str) -> None:
     text = f"convention: standard\n\na | alpha | d | theta [deg] | offset\n0 | 0 | 0 | {theta} | 5\n"
     assert table_from_text(text, ".md").rows[0].theta == math.radians(15.0 if "10" in theta else 5.0)
+
+
+@pytest.mark.parametrize("heading", ["offset", "θ offset", "theta_offset"])
+def test_a_column_of_offsets_is_added_to_theta(heading: str) -> None:
+    text = f"standard DH\n\na | alpha | d | theta | {heading} [deg]\n0 | 0 | 0 | q1 | 90\n"
+    assert table_from_text(text, ".md").rows[0].theta == math.pi / 2
 
 
 def test_a_printed_pose_is_in_metres_also_in_a_table_in_millimetres() -> None:

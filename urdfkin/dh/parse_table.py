@@ -49,9 +49,10 @@ _NAMES = {
     **dict.fromkeys(("d", "link offset"), "d"),
     **dict.fromkeys(("theta", "joint angle", "angle"), "theta"),
     "beta": "beta",
-    "offset": "offset",
+    **dict.fromkeys(("offset", "theta offset", "theta_offset"), "offset"),
     **dict.fromkeys(("joint", "name", "joint name"), "joint"),
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
+    **dict.fromkeys(("variable", "joint variable"), "variable"),
 }
 _KINDS_BY_SIGMA = {"0": "R", "1": "P"}
 _ROW_NUMBERS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
@@ -160,9 +161,20 @@ def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: s
             rows.append(cells)
         else:
             end = len(lines)
+        if any(_parse_columns(split(other)) for other in lines[end:]):
+            raise _second_table_error(line)
         others, decimal_commas = [*lines[:k], *lines[end:]], separator in (";", "\t", "|")
         return _Grid(columns, rows, others, decimal_commas, separator == ",")
     return None
+
+
+def _second_table_error(heading: str) -> InputError:
+    return InputError(
+        "the text contains more than one table",
+        where="header",
+        found=f"a second heading with {', '.join(COLUMNS)} below {safe_repr(heading.strip())}",
+        remedy="write each table into its own file",
+    )
 
 
 def _missing_header_error(lines: list[str]) -> InputError:
@@ -199,6 +211,8 @@ def _parse_latex(lines: list[str]) -> _Grid | None:
     grid = _find_grid(
         [row for row in rows if row], lambda row: [cell.strip() for cell in re.split(r"(?<!\\)&", row)]
     )
+    if grid is not None and _parse_latex(text[found.end() :].splitlines()):
+        raise _second_table_error(" & ".join(column.heading for column in grid.columns))
     other_lines = (text[: found.start()] + text[found.end() :]).splitlines()
     return grid and _Grid(grid.columns, grid.rows, other_lines)
 
@@ -343,6 +357,8 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             row[column.name] = _add_unit(cell, column, where, grid)
         elif column.name == "kind":
             row["kind"] = _KINDS_BY_SIGMA.get(cell, cell)
+        elif column.name == "variable":
+            row |= _parse_variable(cell, f"row {index + 1}, variable")
         elif column.name in LIMIT_KEYS and column.unit:
             row[column.name] = f"{cell} {column.unit}"
         else:
@@ -351,6 +367,17 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             )
     units = {column.name: column.unit for column in grid.columns}
     return _nest_row(row, units, f"row {index + 1}, offset")
+
+
+def _parse_variable(cell: str, where: str) -> dict[str, Any]:
+    """Parse a variable such as d3 or -θ2; d and theta state the kind of the joint, and q states no kind."""
+    found = re.fullmatch(r"(-?)\s*(theta|th|d|q)[\W_]*[0-9]*[\W_]*", to_plain_text(cell))
+    if found is None:
+        raise InputError(
+            "this is not a joint variable", where=where, found=safe_repr(cell), remedy="write θ1, d1 or q1"
+        )
+    kind = {"q": {}, "d": {"kind": "P"}}.get(found[2], {"kind": "R"})
+    return kind | ({"sense": "-1"} if found[1] else {})
 
 
 def _add_unit(original: str, column: _Column, where: str, grid: _Grid) -> str:
