@@ -352,6 +352,18 @@ def test_two_fixed_joints_with_exchanged_names_of_moving_joints_are_not_free(x: 
     assert certified(found, a, b)
 
 
+def test_a_certificate_passes_the_recheck_if_a_fixed_joint_separated_no_bodies() -> None:
+    a = built(
+        *(joint(name, "fixed", "base", f"l_{name}", f'xyz="0 {y} 0"', axis="") for y, name in enumerate("jk"))
+    )
+    b = built(
+        joint("j", "revolute", "other", "arm", more=limit()),
+        joint("k", "revolute", "arm", "l_k", 'xyz="1 0 0"', "1 0 0", limit()),
+    )
+    for models in ((a, b), (b, a)):
+        assert certified(urdfkin.same(*models), *models)
+
+
 def on_a_root(root: str, *more: str) -> Robot:
     """Return a robot with two legs on the root link."""
     legs = [

@@ -310,7 +310,9 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
     if (error := _choices_error(document, choices, comparator)) is not None:
         yield error
         return
-    alignment = comparator.align({one["a"]: one["b"] for one in document["joints"]}, choices)
+    joint_map = {one["a"]: one["b"] for one in document["joints"]}
+    comparator.merge_fixed_joints_except(joint_map)
+    alignment = comparator.align(joint_map, choices)
     variables = variables_of(alignment, comparator.tolerance)
     result = comparator.result_without_bounds(alignment, variables)
     wrong = list(_statement_errors(document, comparator, result))

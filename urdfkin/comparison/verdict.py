@@ -235,6 +235,15 @@ class Comparator:
                 return found
             self.mechanisms = a.merge({i for i, _ in fixed}), b.merge({j for _, j in fixed})
 
+    def merge_fixed_joints_except(self, names: Mapping[str, str]) -> None:
+        """Separate bodies only at moving joints, and at the fixed joints in `names`."""
+        a, b = self.mechanisms
+        theirs = set(names.values())
+        self.mechanisms = (
+            a.merge({edge.joint for edge in a.edges if a.joint(edge).name not in names}),
+            b.merge({edge.joint for edge in b.edges if b.joint(edge).name not in theirs}),
+        )
+
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
         """Return the verdict and the differences, and store the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
