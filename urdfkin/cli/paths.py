@@ -245,7 +245,7 @@ def _structure_document(found: Structure) -> TextDocument:
     point = ", ".join(format_number(x, 1e-12) for x in found.reach_from)
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.sampled_reach:.4g} m on samples{bound}, measured from ({point}) m,"
+        f"reach: {found.sampled_reach:.6g} m on samples{bound}, measured from ({point}) m,"
         f" {found.reach_point}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
