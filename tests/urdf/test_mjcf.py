@@ -378,6 +378,18 @@ def test_an_inactive_equality_is_no_mimic_rule() -> None:
     assert "mimic rules" not in robot.certificate().source_notes
 
 
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_a_flag_that_disables_equalities_removes_the_mimic_rules(flag: str) -> None:
+    weld = '<weld name="glue" body1="A" body2="B"/>'
+    option = f'<mujoco><option><flag {flag}="disable"/></option>'
+    text = coupled(*_CHAIN, weld).replace("<mujoco>", option)
+    robot = loaded(text)
+    assert robot.coordinate_names == ("a", "b", "c")
+    assert "mimic rules" not in robot.certificate().source_notes
+    findings = [one for one in robot.findings if one.element == "equality"]
+    assert {one.name: one.code for one in findings} == dict.fromkeys(("first", "second", "glue"), "MJCF102")
+
+
 def wrong_offset(right: Callable[..., Any]) -> Callable[..., Any]:
     def rule(self: Any, i: int) -> Any:
         name, found = right(self, i)

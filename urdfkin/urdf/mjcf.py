@@ -187,7 +187,6 @@ class Mjcf:
         mujoco, m = import_mujoco(), self.model
         off = mujoco.mjtDisableBit
         m.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_FRICTIONLOSS)
-        m.opt.disableflags &= ~(int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_EQUALITY))
         data, out = mujoco.MjData(m), np.full((len(q), m.neq), np.nan)
         for k, qpos in enumerate(self.qpos(q)):
             data.qpos[:] = qpos
@@ -367,11 +366,12 @@ def _find_unused_elements(spec: Any) -> Iterator[tuple[str, list[Any]]]:
 
 def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
     """Yield the parts that the tree does not represent, except equalities between joints."""
+    disabled = _disables_equalities(mujoco, spec.option)
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
             kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
             what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot represent"
-            yield MjcfRemark(what, f"equality {one.name or i}", moves=bool(one.active))
+            yield MjcfRemark(what, f"equality {one.name or i}", moves=bool(one.active) and not disabled)
     useless = dict(_find_unused_elements(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
         if useless.pop(words, None):
@@ -382,6 +382,11 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
             for words, found in useless.items()
         )
         yield MjcfRemark(f"kinematics does not use {counts}")
+
+
+def _disables_equalities(mujoco: Any, option: Any) -> bool:
+    off = mujoco.mjtDisableBit
+    return bool(option.disableflags & (int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_EQUALITY)))
 
 
 def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
@@ -544,13 +549,15 @@ class _MjcfReader:
 
     def _read_rules(self) -> Iterator[tuple[str, Mimic]]:
         m, rules = self.model, dict[str, Mimic]()
+        disabled = _disables_equalities(self.mujoco, m.opt)
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
                 continue
             where = f"equality {m.equality(i).name or i}"
             rule = self._read_rule(i)
-            if not m.eq_active0[i]:
-                self.remarks.append(MjcfRemark("a constraint that is not active", where))
+            if disabled or not m.eq_active0[i]:
+                what = "a constraint that <flag> disables" if disabled else "a constraint that is not active"
+                self.remarks.append(MjcfRemark(what, where))
                 continue
             if rule is None:
                 names = _join_names(
