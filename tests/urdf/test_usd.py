@@ -128,6 +128,21 @@ def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_th
     assert findings(robot) == [f"USD102 /arm/rail: {what}"]
 
 
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [((2000, "inf"), (2000.0, 3000.0)), (("-inf", -1000), (-2000.0, -1000.0))],
+    ids=["lower", "upper"],
+)
+def test_a_limit_that_replaces_a_missing_limit_leaves_the_joint_a_range(
+    read: Read, given: tuple[Any, Any], expected: tuple[float, float]
+) -> None:
+    rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=given, localPos0=(2, 0, 0))
+    robot = read(LINKS + SHOULDER + rail)
+    limit = present(robot.tree.joints[1].limit)
+    assert (limit.lower, limit.upper) == expected
+    assert f"gets {expected[given[0] == 2000]:+g} m" in findings(robot)[0]
+
+
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
     robot = read(ARM)
     assert (robot.name, robot.link_names) == ("arm", ("base", "upper", "lower"))
@@ -418,6 +433,14 @@ def test_a_variant_is_selected(write: Write) -> None:
     found = command("placement", str(path), "--variant", "gripper=long", "--q", "0 0", "--format", "json")
     assert found.code == 0, found.err
     assert "5.0" in found.text
+
+
+@pytest.mark.parametrize("option", [("--variant", "a=b"), ("--articulation", "a")])
+def test_check_refuses_an_option_of_usd_without_a_usd_file(write: Write, option: tuple[str, str]) -> None:
+    done = command("check", "ur5", *option)
+    assert (done.code, f"{option[0]} does nothing without a USD file" in done.err) == (2, True)
+    path = str(write(variants()))
+    assert command("check", "ur5", path, "--variant", "gripper=long").code == 0
 
 
 ARCS = ("references", "payload", "instanceable = true\n    references")

@@ -18,6 +18,7 @@ The inertial frame depends on the shapes. With these options, MuJoCo therefore n
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -589,6 +590,21 @@ class _MjcfReader:
         return self._joint_name_by_index[y], Mimic(
             self._joint_name_by_index[x], float(c[1]), float(y0 + c[0] - c[1] * x0)
         )
+
+
+def replace_missing_limits(lower: float, upper: float) -> tuple[float, float]:
+    """Replace infinite limits (m) of a prismatic joint.
+
+    >>> replace_missing_limits(-1.0, math.inf), replace_missing_limits(2500.0, math.inf)
+    ((-1.0, 1000.0), (2500.0, 3500.0))
+    """
+    far = FALLBACK_PRISMATIC_LIMIT
+    low, high = (x if math.isfinite(x) else math.copysign(far, x) for x in (lower, upper))
+    if lower == -math.inf and high <= -far:
+        low = high - far
+    if upper == math.inf and far <= lower < math.inf:
+        high = lower + far
+    return low, high
 
 
 def make_unique(name: str, used_names: set[str]) -> str:
