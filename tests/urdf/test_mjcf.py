@@ -606,6 +606,14 @@ def test_check_uses_the_options_of_loading_for_an_mjcf_file(write: Write) -> Non
     assert (done.code, "only for robots from a .xacro file" in done.err) == (2, True)
 
 
+def test_check_reads_mjcf_from_standard_input() -> None:
+    idle = '<joint name="idle" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>'
+    done = command("check", "-", "--format", "concise", stdin="\ufeff" + coupled(idle))
+    column = coupled(idle).index(idle) + 1
+    expected = f"<stdin>:1:{column}: MJCF102 note: equality 'idle': a constraint that is not active"
+    assert (done.code, done.text.splitlines()[0]) == (0, expected)
+
+
 UNNAMED = f'<body pos="0 0 1">{MASS}{{}}</body><site'
 MESH = '<geom type="mesh" mesh="nope"/></body></worldbody><asset><mesh name="nope" file="nope.stl"/></asset>'
 
