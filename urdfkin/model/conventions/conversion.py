@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.inputs import as_finite, as_floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout
@@ -651,7 +651,7 @@ class Conversion:
         >>> drake.reorder_six_vector([1, 2, 3, 4, 5, 6]).tolist()
         [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
         """
-        array = np.asarray(x, dtype=np.float64)
+        array = as_floats(x, "six-vectors")
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
         return np.take(array, _ANGULAR_FIRST, axis) if self.angular_first else array
@@ -670,10 +670,10 @@ class Conversion:
             J: (..., rows, nv) matrix.
 
         Raises:
-            InputError: The target program has additional columns for mimic joints.
+            InputError: The target program has additional columns for mimic joints, or J has not nv columns.
         """
         self._refuse_mimic_columns()
-        array = np.asarray(J, dtype=np.float64)
+        array = _as_columns(J, self.tree.nv)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_index]
         return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
@@ -687,7 +687,7 @@ class Conversion:
             q: Configuration.
             J: (..., 6, program's nv) Jacobian.
         """
-        array = self.reorder_six_vector(J, -2)
+        array = self.reorder_six_vector(_as_columns(J, self.nv), -2)
         return array @ _add_frame_axis(self.matrix(q), array.ndim)
 
     def jacobian_rate(
@@ -702,7 +702,7 @@ class Conversion:
             return converted
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
-        array = self.reorder_six_vector(J, -2)
+        array = self.reorder_six_vector(_as_columns(J, self.tree.nv), -2)
         return converted + array @ _add_frame_axis(change, array.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
@@ -716,8 +716,8 @@ class Conversion:
         self._refuse_mimic_columns()
         inverse, tensor, columns = (
             self.inverse_matrix(q),
-            self.reorder_six_vector(H, -3),
-            self.reorder_six_vector(J, -2),
+            self.reorder_six_vector(_as_columns(H, self.tree.nv, "a Hessian", 2), -3),
+            self.reorder_six_vector(_as_columns(J, self.tree.nv), -2),
         )
         W = _add_frame_axis(inverse, columns.ndim)
         converted: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
@@ -874,6 +874,15 @@ def _multiply(B: FloatArray, x: FloatArray) -> FloatArray:
 
 def _inverse(B: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.inv(B), dtype=np.float64)
+
+
+def _as_columns(value: ArrayLike, nv: int, name: str = "a Jacobian", count: int = 1) -> FloatArray:
+    """Convert a Jacobian or Hessian to floats; refuse a length other than nv in the last `count` axes."""
+    array = as_floats(value, name)
+    if array.ndim < count + 1 or array.shape[-count:] != (nv,) * count:
+        shape = ", ".join(("...", "rows", *[str(nv)] * count))
+        raise InputError(f"{name} must have the shape ({shape})", found=str(array.shape))
+    return array
 
 
 def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
