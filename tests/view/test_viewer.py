@@ -146,6 +146,19 @@ def test_a_slider_has_steps_of_one_degree_and_the_limits_at_both_ends(viewer: Vi
         assert [float(mark.label) for mark in handle._marks] == pytest.approx(ends, abs=0.05)
 
 
+def test_a_value_that_the_browser_rounds_beyond_a_limit_becomes_the_limit() -> None:
+    lower, upper = -1.234567, 2.5
+    turns = joint("turns", "revolute", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(lower, upper))
+    with shown_robot(urdfkin.load(robot_of(turns))) as viewer:
+        (handle,) = viewer.sliders.handles
+        for end, shown_end in ((upper, 143.24), (lower, -70.74)):  # the browser shows two decimals
+            handle.value = shown_end
+            assert viewer.q.tolist() == [end]
+        viewer.set_q([3.0])
+        handle.value = 171.89
+        assert viewer.q[0] > upper
+
+
 def test_missing_meshes_are_listed_with_the_remedy() -> None:
     addresses = [f"package://arm/m{i}.stl" for i in range(7)]
     missing = [Shape("l", "mesh", (1.0, 1.0, 1.0), np.eye(4), None, None, name) for name in addresses]

@@ -119,8 +119,15 @@ class Sliders:
         return handle
 
     def _on_update(self, row: SliderRow, handle: Any) -> None:
-        if not self._is_setting:
-            self._on_change(row.index, float(handle.value) / self._scale(row))
+        if self._is_setting:
+            return
+        scale = self._scale(row)
+        # The browser rounds a value at an end of the slider, so the value can be beyond this end.
+        lower, upper = (
+            limit if end == scale * limit else end / scale
+            for end, limit in ((handle.min, row.lower), (handle.max, row.upper))
+        )
+        self._on_change(row.index, min(max(float(handle.value) / scale, lower), upper))
 
     def show(self, values: FloatArray) -> None:
         self._is_setting = True
