@@ -18,7 +18,7 @@ import pytest
 import urdfkin
 from tests.attacks.test_viewer_server import free_port
 from tests.report.browser import Browser, opened, require_chromium
-from tests.urdfs import joint, limit
+from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
@@ -134,6 +134,15 @@ def test_a_slider_has_the_limits_of_the_joint_and_a_joint_without_a_range_has_no
     assert [row.name for row in coordinate_rows(robot)] == ["turns"]
     assert fixed_coordinates(robot) == ["stays"]
     assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
+    far = joint("far", "prismatic", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(1.5, 300))
+    robot = loaded(robot_of(far))
+    assert within_limits(robot, robot.neutral()).tolist() == [1.5]
+
+
+def test_a_joint_with_a_denormal_range_has_a_slider() -> None:
+    slides = joint("slides", "prismatic", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(0, 1e-322))
+    with shown_robot(loaded(robot_of(slides))) as viewer:
+        assert viewer.sliders.handles[0].max == 1e-322
 
 
 def test_a_slider_has_steps_of_one_degree_and_the_limits_at_both_ends(viewer: Viewer) -> None:

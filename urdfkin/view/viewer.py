@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -153,7 +154,7 @@ class Sliders:
     def _step(self, row: SliderRow, width: float) -> float:
         if row.is_angle:
             return _STEP_DEGREES if self._degrees else _STEP_RADIANS
-        size = width / _MIN_STEPS
+        size = max(width / _MIN_STEPS, sys.float_info.min)
         power = 10.0 ** math.floor(math.log10(size))
         return next(power * digit for digit in (5.0, 2.0, 1.0) if power * digit <= size * (1.0 + 1e-9))
 
@@ -211,12 +212,7 @@ def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
 
 
 def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
-    out = np.array(q, dtype=np.float64)
-    for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
-        for k in range(min(joint.nq, 3)):
-            lower, upper = _limits(joint, math.pi if _is_angle(joint, k) else 1.0)
-            out[at + k] = min(max(out[at + k], lower), upper)
-    return out
+    return np.clip(q, *robot.limits)
 
 
 def format_values(values: FloatArray) -> str:
