@@ -117,6 +117,17 @@ def test_the_text_field_shows_and_reads_q_in_a_convention() -> None:
         np.testing.assert_array_equal(viewer.q, other)
 
 
+def test_a_quaternion_typed_in_a_convention_must_have_length_1() -> None:
+    slides = joint("slides", "prismatic", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(-1, 1))
+    robot = loaded(robot_of(slides), root_joint="floating")
+    with shown_robot(robot, conversion=robot.convention("mujoco")) as viewer:
+        before = viewer.q
+        viewer.words_of_q.value = "0,0,0,2,0,0,0,0.5"
+        viewer._read_q_field(SimpleNamespace(client=object()))
+        assert "must be a unit quaternion" in viewer.wrong.content
+        np.testing.assert_array_equal(viewer.q, before)
+
+
 def test_a_slider_has_the_limits_of_the_joint_and_a_joint_without_a_range_has_no_slider() -> None:
     robot = urdfkin.load("panda")
     rows = {row.name: row for row in coordinate_rows(robot)}

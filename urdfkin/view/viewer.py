@@ -453,12 +453,10 @@ class Viewer:
             return
         with self._lock:
             try:
-                text = self.words_of_q.value
+                q = self.words_of_q.value
                 if self._conversion is not None:
-                    q = self._conversion.from_(self._conversion.layout("q").parse(text))
-                else:
-                    q = parse_finite(self.robot.tree, text, "q", warn=False)
-                self.q = q.copy()
+                    q = self._conversion.from_(self._conversion.layout("q").parse(q))
+                self.q = parse_finite(self.robot.tree, q, "q", warn=False).copy()
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
