@@ -436,9 +436,12 @@ def test_a_variant_is_selected(write: Write) -> None:
 
 
 @pytest.mark.parametrize("option", [("--variant", "a=b"), ("--articulation", "a")])
-def test_check_refuses_an_option_of_usd_without_a_usd_file(write: Write, option: tuple[str, str]) -> None:
-    done = command("check", "ur5", *option)
-    assert (done.code, f"{option[0]} does nothing without a USD file" in done.err) == (2, True)
+def test_check_and_validate_refuse_an_option_of_usd_without_a_usd_file(
+    write: Write, option: tuple[str, str]
+) -> None:
+    for name in ("check", "validate"):
+        done = command(name, "ur5", *option)
+        assert (done.code, f"{option[0]} does nothing without a USD file" in done.err) == (2, True)
     path = str(write(variants()))
     assert command("check", "ur5", path, "--variant", "gripper=long").code == 0
 

@@ -240,7 +240,7 @@ def validate_command(
             "--shard cannot be combined with a report file; run `urdfkin report merge`, then `urdfkin report`"
         )
     from urdfkin.report.terminal import print_report
-    from urdfkin.urdf.sources import is_xacro
+    from urdfkin.urdf.sources import is_usd, is_xacro
     from urdfkin.validation.campaign import validate
     from urdfkin.validation.store import StudySettings
 
@@ -248,6 +248,8 @@ def validate_command(
     how = load_options()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
+    if not any(map(is_usd, robots)):
+        reject_unused_options(context, ("variant", "articulation"), "without a USD file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
     sources = [source for robot in robots for source in _list_urdf_files(robot)] or list(
         example_robot_data_names()
