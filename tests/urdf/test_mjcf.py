@@ -589,6 +589,15 @@ def test_a_finding_has_the_name_and_the_position_of_its_element(write: Write) ->
     assert [{"name": "glue", "kind": "equality"}] in names
 
 
+@pytest.mark.parametrize("verify", [True, False])
+def test_a_constraint_without_a_name_has_its_number_in_the_file(write: Write, verify: bool) -> None:
+    weld = '<weld body1="A" body2="B"/>\n'
+    idle = '<joint joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>\n'
+    robot = loaded(write(coupled("\n", weld, idle), "welded.xml"), verify=verify)
+    found = {one.name: (one.code, one.line) for one in robot.findings if one.element == "equality"}
+    assert found == {"0": ("MJCF101", 2), "1": ("MJCF102", 3)}
+
+
 def test_an_element_of_an_included_file_has_no_line(write: Write) -> None:
     write('<mujoco><equality><weld body1="b" body2="two"/></equality></mujoco>', "part.xml")
     path = write(PLACES.replace("  <sensor>", '  <include file="part.xml"/><sensor>'), "top.xml")

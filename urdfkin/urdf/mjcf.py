@@ -283,10 +283,16 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
             fused_model = compile_spec(_load_spec(mujoco, source))
         spec.compiler.fusestatic = False
         notes = list(_find_omissions(mujoco, spec))
+        # The removal of other constraints changes the index of a constraint, so the names are read before.
+        equalities = [
+            one.name or str(i)
+            for i, one in enumerate(spec.equalities)
+            if with_shapes or one.type == mujoco.mjtEq.mjEQ_JOINT
+        ]
         if not with_shapes:
             _remove_unused_elements(mujoco, spec)
         model = compile_spec(spec)
-        reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name)
+        reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name, equalities)
         tree = reader.make_tree()
     except UnicodeDecodeError as error:
         message = "this MJCF contains a name that is not UTF-8"
@@ -434,6 +440,7 @@ class _MjcfReader:
     model: Any
     name: str
     source: str
+    equality_names: list[str]
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
     qpos_index: dict[str, int] = field(default_factory=dict)
     remarks: list[MjcfRemark] = field(default_factory=list)
@@ -554,7 +561,7 @@ class _MjcfReader:
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
                 continue
-            where = f"equality {m.equality(i).name or i}"
+            where = f"equality {self.equality_names[i]}"
             rule = self._read_rule(i)
             if disabled or not m.eq_active0[i]:
                 what = "a constraint that <flag> disables" if disabled else "a constraint that is not active"
