@@ -380,7 +380,7 @@ def test_an_inactive_equality_is_no_mimic_rule() -> None:
 
 @pytest.mark.parametrize("flag", ["equality", "constraint"])
 def test_a_flag_that_disables_equalities_removes_the_mimic_rules(flag: str) -> None:
-    weld = '<weld name="glue" body1="A" body2="B"/>'
+    weld = '<weld name="glue" body1="a" body2="b"/>'
     option = f'<mujoco><option><flag {flag}="disable"/></option>'
     text = coupled(*_CHAIN, weld).replace("<mujoco>", option)
     robot = loaded(text)
@@ -591,7 +591,7 @@ def test_a_finding_has_the_name_and_the_position_of_its_element(write: Write) ->
 
 @pytest.mark.parametrize("verify", [True, False])
 def test_a_constraint_without_a_name_has_its_number_in_the_file(write: Write, verify: bool) -> None:
-    weld = '<weld body1="A" body2="B"/>\n'
+    weld = '<weld body1="a" body2="b"/>\n'
     idle = '<joint joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>\n'
     robot = loaded(write(coupled("\n", weld, idle), "welded.xml"), verify=verify)
     found = {one.name: (one.code, one.line) for one in robot.findings if one.element == "equality"}
