@@ -249,6 +249,9 @@ def test_mjcf_is_loaded_from_text_bytes_streams_and_standard_input(monkeypatch: 
         assert robot.certificate().verified
     with pytest.raises(InputError, match="<bytes>: MuJoCo does not accept this MJCF"):
         loaded(b"<mujoco>\xff</mujoco>")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"<mujoco><wrong/></mujoco>")))
+    with pytest.raises(InputError, match="<stdin>: MuJoCo does not accept this MJCF"):
+        loaded("-")
 
 
 def test_all_commands_accept_an_mjcf_file(write: Write) -> None:
