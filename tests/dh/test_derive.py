@@ -489,6 +489,15 @@ def test_a_floating_joint_is_refused_with_a_remedy() -> None:
         make_tree_parameters(with_root_joint(arm(np.eye(4)), JointKind.FLOATING))
 
 
+@pytest.mark.parametrize("fill", ["masked", "complex", "text"])
+def test_a_table_of_a_robot_refuses_values_that_are_not_real_numbers(fill: str) -> None:
+    table = make_tree_parameters(arm(np.eye(4)))
+    q = np.zeros(len(table.coordinates))
+    wrong = {"masked": np.ma.array(q, mask=True), "complex": q + 1j, "text": q.astype(str)}[fill]
+    with pytest.raises(InputError, match="q must be real numbers"):
+        table.placements(wrong)
+
+
 def test_the_written_table_contains_the_antecedents() -> None:
     tree = arm(shift(0, 0, 0.3), shift(0.05, 0, 0) @ rotation("x", math.pi / 2), kinds="RP")
     table = make_tree_parameters(tree)

@@ -149,6 +149,9 @@ def test_exported_code_contains_the_screws_as_columns(tmp_path: Path) -> None:
         ([[0, 0, 1]], M, r"screws must have the shape \(n, 6\)"),
         ([[0, 0, 1, 0, 0, 0]], np.ones((4, 4)), "M must be a rotation"),
         ([[0, 0, 1, 0, 0, np.nan]], M, "finite"),
+        (np.ma.array([[0, 0, 1, 0.3, 0, 0]], mask=True), M, "screws must be real numbers"),
+        ([["0", "0", "1", "0", "0", "0"]], M, "screws must be real numbers"),
+        ([[0, 0, 1, 0, 0, 0]], np.eye(4) + 1j, "M must be real numbers"),
     ],
 )
 def test_an_invalid_screw_is_refused_with_the_reason(screws: Any, home: Any, message: str) -> None:
@@ -205,7 +208,7 @@ def test_a_wrong_name_in_a_screw_file_is_reported(line: str, message: str, tmp_p
 def test_an_error_in_a_screw_file_is_reported_with_the_position(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nspace = [['x']]\n")
-    with pytest.raises(InputError, match=r"arm.toml, space: screws and M must be lists of numbers"):
+    with pytest.raises(InputError, match=r"arm.toml: screws must be real numbers: found \[\['x'\]\]"):
         load(path)
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nscrews = []\n")
     with pytest.raises(InputError, match="unknown key in the table of screws: found 'screws'"):

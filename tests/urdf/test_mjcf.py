@@ -249,6 +249,9 @@ def test_mjcf_is_loaded_from_text_bytes_streams_and_standard_input(monkeypatch: 
         assert robot.certificate().verified
     with pytest.raises(InputError, match="<bytes>: MuJoCo does not accept this MJCF"):
         loaded(b"<mujoco>\xff</mujoco>")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"<mujoco><wrong/></mujoco>")))
+    with pytest.raises(InputError, match="<stdin>: MuJoCo does not accept this MJCF"):
+        loaded("-")
 
 
 def test_all_commands_accept_an_mjcf_file(write: Write) -> None:
@@ -376,6 +379,18 @@ def test_an_inactive_equality_is_no_mimic_rule() -> None:
     robot = loaded(coupled(idle))
     assert robot.coordinate_names == ("a", "b", "c")
     assert "mimic rules" not in robot.certificate().source_notes
+
+
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_a_flag_that_disables_equalities_removes_the_mimic_rules(flag: str) -> None:
+    weld = '<weld name="glue" body1="a" body2="b"/>'
+    option = f'<mujoco><option><flag {flag}="disable"/></option>'
+    text = coupled(*_CHAIN, weld).replace("<mujoco>", option)
+    robot = loaded(text)
+    assert robot.coordinate_names == ("a", "b", "c")
+    assert "mimic rules" not in robot.certificate().source_notes
+    findings = [one for one in robot.findings if one.element == "equality"]
+    assert {one.name: one.code for one in findings} == dict.fromkeys(("first", "second", "glue"), "MJCF102")
 
 
 def wrong_offset(right: Callable[..., Any]) -> Callable[..., Any]:
@@ -577,6 +592,15 @@ def test_a_finding_has_the_name_and_the_position_of_its_element(write: Write) ->
     assert [{"name": "glue", "kind": "equality"}] in names
 
 
+@pytest.mark.parametrize("verify", [True, False])
+def test_a_constraint_without_a_name_has_its_number_in_the_file(write: Write, verify: bool) -> None:
+    weld = '<weld body1="a" body2="b"/>\n'
+    idle = '<joint joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>\n'
+    robot = loaded(write(coupled("\n", weld, idle), "welded.xml"), verify=verify)
+    found = {one.name: (one.code, one.line) for one in robot.findings if one.element == "equality"}
+    assert found == {"0": ("MJCF101", 2), "1": ("MJCF102", 3)}
+
+
 def test_an_element_of_an_included_file_has_no_line(write: Write) -> None:
     write('<mujoco><equality><weld body1="b" body2="two"/></equality></mujoco>', "part.xml")
     path = write(PLACES.replace("  <sensor>", '  <include file="part.xml"/><sensor>'), "top.xml")
@@ -592,6 +616,14 @@ def test_check_uses_the_options_of_loading_for_an_mjcf_file(write: Write) -> Non
     assert (done.code, "URDF403" in done.text) == (1, True)
     done = command("check", path, "--xacro-arg", "a:=1")
     assert (done.code, "only for robots from a .xacro file" in done.err) == (2, True)
+
+
+def test_check_reads_mjcf_from_standard_input() -> None:
+    idle = '<joint name="idle" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>'
+    done = command("check", "-", "--format", "concise", stdin="\ufeff" + coupled(idle))
+    column = coupled(idle).index(idle) + 1
+    expected = f"<stdin>:1:{column}: MJCF102 note: equality 'idle': a constraint that is not active"
+    assert (done.code, done.text.splitlines()[0]) == (0, expected)
 
 
 UNNAMED = f'<body pos="0 0 1">{MASS}{{}}</body><site'

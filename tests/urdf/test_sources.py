@@ -317,7 +317,7 @@ def slider(lower: float, upper: float) -> pin.Model:
 def test_only_a_missing_limit_of_a_prismatic_joint_of_a_pinocchio_model_is_replaced() -> None:
     for given, expected in (
         ((-2000.0, math.inf), (-2000.0, 1000.0)), ((-math.inf, 2000.0), (-1000.0, 2000.0)),
-        ((-math.inf, math.inf), (-1000.0, 1000.0)),
+        ((-math.inf, math.inf), (-1000.0, 1000.0)), ((2000.0, math.inf), (2000.0, 3000.0)),
     ):  # fmt: skip
         limits = present(loaded(slider(*given)).tree.joints[0].limit)
         assert (limits.lower, limits.upper) == expected

@@ -128,6 +128,21 @@ def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_th
     assert findings(robot) == [f"USD102 /arm/rail: {what}"]
 
 
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [((2000, "inf"), (2000.0, 3000.0)), (("-inf", -1000), (-2000.0, -1000.0))],
+    ids=["lower", "upper"],
+)
+def test_a_limit_that_replaces_a_missing_limit_leaves_the_joint_a_range(
+    read: Read, given: tuple[Any, Any], expected: tuple[float, float]
+) -> None:
+    rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=given, localPos0=(2, 0, 0))
+    robot = read(LINKS + SHOULDER + rail)
+    limit = present(robot.tree.joints[1].limit)
+    assert (limit.lower, limit.upper) == expected
+    assert f"gets {expected[given[0] == 2000]:+g} m" in findings(robot)[0]
+
+
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
     robot = read(ARM)
     assert (robot.name, robot.link_names) == ("arm", ("base", "upper", "lower"))
@@ -436,6 +451,17 @@ def test_validate_locks_the_joints_of_a_variant_once(write: Write) -> None:
     done = command(*words, "--lock", "nowhere=0")
     assert done.code == 2
     assert f"{words[1]}: bad input: lock: unknown coordinate 'nowhere'" in " ".join(done.text.split())
+
+
+@pytest.mark.parametrize("option", [("--variant", "a=b"), ("--articulation", "a")])
+def test_check_and_validate_refuse_an_option_of_usd_without_a_usd_file(
+    write: Write, option: tuple[str, str]
+) -> None:
+    for name in ("check", "validate"):
+        done = command(name, "ur5", *option)
+        assert (done.code, f"{option[0]} does nothing without a USD file" in done.err) == (2, True)
+    path = str(write(variants()))
+    assert command("check", "ur5", path, "--variant", "gripper=long").code == 0
 
 
 ARCS = ("references", "payload", "instanceable = true\n    references")

@@ -18,7 +18,7 @@ import pytest
 import urdfkin
 from tests.attacks.test_viewer_server import free_port
 from tests.report.browser import Browser, opened, require_chromium
-from tests.urdfs import joint, limit
+from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
@@ -117,6 +117,17 @@ def test_the_text_field_shows_and_reads_q_in_a_convention() -> None:
         np.testing.assert_array_equal(viewer.q, other)
 
 
+def test_a_quaternion_typed_in_a_convention_must_have_length_1() -> None:
+    slides = joint("slides", "prismatic", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(-1, 1))
+    robot = loaded(robot_of(slides), root_joint="floating")
+    with shown_robot(robot, conversion=robot.convention("mujoco")) as viewer:
+        before = viewer.q
+        viewer.words_of_q.value = "0,0,0,2,0,0,0,0.5"
+        viewer._read_q_field(SimpleNamespace(client=object()))
+        assert "must be a unit quaternion" in viewer.wrong.content
+        np.testing.assert_array_equal(viewer.q, before)
+
+
 def test_a_slider_has_the_limits_of_the_joint_and_a_joint_without_a_range_has_no_slider() -> None:
     robot = urdfkin.load("panda")
     rows = {row.name: row for row in coordinate_rows(robot)}
@@ -134,6 +145,15 @@ def test_a_slider_has_the_limits_of_the_joint_and_a_joint_without_a_range_has_no
     assert [row.name for row in coordinate_rows(robot)] == ["turns"]
     assert fixed_coordinates(robot) == ["stays"]
     assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
+    far = joint("far", "prismatic", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(1.5, 300))
+    robot = loaded(robot_of(far))
+    assert within_limits(robot, robot.neutral()).tolist() == [1.5]
+
+
+def test_a_joint_with_a_denormal_range_has_a_slider() -> None:
+    slides = joint("slides", "prismatic", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(0, 1e-322))
+    with shown_robot(loaded(robot_of(slides))) as viewer:
+        assert viewer.sliders.handles[0].max == 1e-322
 
 
 def test_a_slider_has_steps_of_one_degree_and_the_limits_at_both_ends(viewer: Viewer) -> None:
@@ -144,6 +164,19 @@ def test_a_slider_has_steps_of_one_degree_and_the_limits_at_both_ends(viewer: Vi
         ends = np.rad2deg([row.lower, row.upper])
         assert [mark.value for mark in handle._marks] == pytest.approx(ends)
         assert [float(mark.label) for mark in handle._marks] == pytest.approx(ends, abs=0.05)
+
+
+def test_a_value_that_the_browser_rounds_beyond_a_limit_becomes_the_limit() -> None:
+    lower, upper = -1.234567, 2.5
+    turns = joint("turns", "revolute", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(lower, upper))
+    with shown_robot(urdfkin.load(robot_of(turns))) as viewer:
+        (handle,) = viewer.sliders.handles
+        for end, shown_end in ((upper, 143.24), (lower, -70.74)):  # the browser shows two decimals
+            handle.value = shown_end
+            assert viewer.q.tolist() == [end]
+        viewer.set_q([3.0])
+        handle.value = 171.89
+        assert viewer.q[0] > upper
 
 
 def test_missing_meshes_are_listed_with_the_remedy() -> None:

@@ -325,6 +325,8 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     run = _make_run(context.meta[_SETTINGS_KEY], options)
     for word in files or ["."]:
         run.check_all(word, options["exclude"])
+    if not run.has_usd:
+        reject_unused_options(context, ("variant", "articulation"), "without a USD file")
     outcome = run.outcome
     if (baseline := run.finding_filter.baseline) is not None:
         outcome.known_count, outcome.obsolete_count = (
@@ -396,6 +398,7 @@ class CheckRun:
 
     Attributes:
         fold: Whether many findings with the same code share a line of output; see `urdfkin.check`.
+        has_usd: Whether a USD file was among the files.
         writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
     """
@@ -409,6 +412,7 @@ class CheckRun:
     allows_unsafe_fixes: bool
     commit_files: CommitFiles | None
     writes_baseline: bool
+    has_usd: bool = False
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
     _checked_files: set[str] = field(default_factory=set)
     _has_changes: dict[tuple[str, ...], bool] = field(default_factory=dict)
@@ -423,6 +427,7 @@ class CheckRun:
         for file in files:
             if file not in self._checked_files:
                 self._checked_files.add(file)
+                self.has_usd = self.has_usd or is_usd(file)
                 try:
                     # A file that the user named directly may be a pipe.
                     if file not in (word, f"./{word}"):
@@ -436,6 +441,9 @@ class CheckRun:
             self._check_usd_or_mjcf(file)
             return
         text = read_source(file, self.examine_text.keywords["limits"].bytes, load_options()["xacro_args"])
+        if file == "-" and _is_mjcf_text(text.data):
+            self._check_usd_or_mjcf(file, text)
+            return
         before = None
         if self.commit_files is not None:
             before = find_known_findings(text, self.commit_files, self.examine_text)
@@ -454,11 +462,13 @@ class CheckRun:
         findings = [self._apply_strict(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
-    def _check_usd_or_mjcf(self, file: str) -> None:
+    def _check_usd_or_mjcf(self, file: str, streamed: UrdfText | None = None) -> None:
         suffixes = USD_SUFFIXES if is_usd(file) else _MJCF
-        if self.commit_files is not None and self._is_unchanged(file, suffixes, self.commit_files):
-            self.outcome.unchanged_count += 1
-            return
+        if self.commit_files is not None:
+            data = read_bytes(Path(file)) if streamed is None else streamed.data
+            if self._is_unchanged(data, suffixes, self.commit_files):
+                self.outcome.unchanged_count += 1
+                return
         from urdfkin.robot.loading import load
 
         how = load_options()
@@ -467,19 +477,21 @@ class CheckRun:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             try:
-                robot = load(file, verify=False, **how)
+                robot = load(file if streamed is None else _make_stream(streamed), verify=False, **how)
                 found = tuple(finding for finding in robot.findings if finding.code in MJCF_AND_USD_RULES)
             except UrdfError as error:
                 found = error.findings
-        text = UrdfText(b"", file, file)
+        label = file if streamed is None else streamed.label
+        text = UrdfText(b"", label, file)
         is_chosen = self.finding_filter.make_predicate(text)
         findings = tuple(self._apply_strict(finding) for finding in found if is_chosen(finding))
-        has_lines = any(one.width and one.file == file for one in findings)
-        data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
-        self.outcome.add(file, Examination(text, data, None, findings, ()))
+        data = b""
+        if any(one.width and one.file == label for one in findings):
+            data = read_bytes(Path(file)) if streamed is None else streamed.data
+        self.outcome.add(file, Examination(text, data.removeprefix(codecs.BOM_UTF8), None, findings, ()))
 
-    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
-        """Return whether a file and its included files are the same as in `commit_files`.
+    def _is_unchanged(self, data: bytes, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
+        """Return whether a file with `data` and its included files are the same as in `commit_files`.
 
         Every file of the commit with a suffix in `suffixes` counts as included. A file that contains the name
         of a deleted file counts as changed.
@@ -488,7 +500,6 @@ class CheckRun:
             self._has_changes[suffixes] = commit_files.has_changes(suffixes)
         if self._has_changes[suffixes]:
             return False
-        data = read_bytes(Path(file))
         return commit_files.contains(data) and not any(
             os.fsencode(name) in data for name in commit_files.missing_names
         )
@@ -554,6 +565,20 @@ def _is_usd_or_mjcf(file: str) -> bool:
     from urdfkin.urdf.mjcf import is_mjcf
 
     return is_mjcf(file)
+
+
+def _is_mjcf_text(data: bytes) -> bool:
+    if b"<mujoco" not in data:
+        return False
+    from urdfkin.urdf.mjcf import is_mjcf
+
+    return is_mjcf(data)
+
+
+def _make_stream(text: UrdfText) -> io.BytesIO:
+    stream = io.BytesIO(text.data)
+    stream.name = text.label
+    return stream
 
 
 def _write_baseline(outcome: CheckOutcome, path: Path) -> None:

@@ -250,6 +250,8 @@ def validate_command(
     how = load_options()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
+    if not any(map(is_usd, robots)):
+        reject_unused_options(context, ("variant", "articulation"), "without a USD file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
     if not any(map(is_usd, robots)):
         reject_unused_options(context, ("variant", "articulation"), "without a USD file")

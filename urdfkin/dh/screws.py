@@ -25,7 +25,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import rotation_defect
+from urdfkin.kinematics.inputs import as_floats, rotation_defect
 from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
@@ -295,9 +295,9 @@ def screws_from_rows(
     Raises:
         InputError: a shape, a screw, a name, M or `frame` is invalid, or the number of names is wrong.
     """
-    S = np.array(screws, dtype=np.float64)
+    S = as_floats(screws, "screws").copy()
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
-    T = np.asarray(M, dtype=np.float64)
+    T = as_floats(M, "M")
     if S.ndim != 2 or S.shape[1] != 6 or T.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
         raise InputError(
             "screws must have the shape (n, 6), with a zero pose M (4, 4) and the frame `space` or `body`",

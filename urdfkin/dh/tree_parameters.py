@@ -40,6 +40,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
+from urdfkin.kinematics.inputs import as_finite
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
@@ -145,7 +146,7 @@ class TreeParameters:
         Returns:
             (..., joints, 4, 4) poses of the URDF link frames in the root frame.
         """
-        q = np.asarray(q, dtype=np.float64)
+        q = as_finite(q, "q")
         if q.shape[-1:] != (len(self.coordinates),):
             raise InputError(f"q needs {len(self.coordinates)} numbers", found=f"shape {q.shape}")
         values = self._values(q)

@@ -239,7 +239,7 @@ def _load_mjcf(
     checks = bool(as_verify(options["verify"]))
     data = _read_mjcf_bytes(source)
     digest = hashlib.sha256(data).hexdigest()
-    read = read_mjcf(source, with_check_data=checks)
+    read = read_mjcf(source, with_check_data=checks, name=streamed.label if streamed else None)
     name = (
         unambiguous_path(Path(read.path))
         if read.path

@@ -22,7 +22,7 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import FALLBACK_PRISMATIC_LIMIT, make_fixed_joint, make_unique
+from urdfkin.urdf.mjcf import make_fixed_joint, make_unique, replace_missing_limits
 from urdfkin.urdf.parser import QUAT_XYZW
 from urdfkin.urdf.reader import find_root_link, make_joint_rows
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
@@ -178,8 +178,8 @@ def is_pinocchio_model(source: object) -> TypeGuard[Any]:
 def convert_pinocchio_model(source: Any) -> ConvertedModel:
     """Convert a `Model` or `RobotWrapper`.
 
-    A revolute joint without finite limits becomes continuous. A prismatic joint gets
-    `FALLBACK_PRISMATIC_LIMIT` for each missing limit. Raise InputError for a mimic joint, and for a joint
+    A revolute joint without finite limits becomes continuous. `replace_missing_limits`
+    replaces each missing limit of a prismatic joint. Raise InputError for a mimic joint, and for a joint
     type that URDF lacks.
     """
     model = getattr(source, "model", source)
@@ -298,10 +298,7 @@ class _ModelReader:
             if kind.turns:
                 kind = JointKind.CONTINUOUS
             else:
-                lower, upper = (
-                    x if math.isfinite(x) else math.copysign(FALLBACK_PRISMATIC_LIMIT, x)
-                    for x in (lower, upper)
-                )
+                lower, upper = replace_missing_limits(lower, upper)
         return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
 
 

@@ -18,6 +18,7 @@ The inertial frame depends on the shapes. With these options, MuJoCo therefore n
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -190,7 +191,6 @@ class Mjcf:
         mujoco, m = import_mujoco(), self.model
         off = mujoco.mjtDisableBit
         m.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_FRICTIONLOSS)
-        m.opt.disableflags &= ~(int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_EQUALITY))
         data, out = mujoco.MjData(m), np.full((len(q), m.neq), np.nan)
         for k, qpos in enumerate(self.qpos(q)):
             data.qpos[:] = qpos
@@ -286,10 +286,16 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
             fused_model = compile_spec(_load_spec(mujoco, source))
         spec.compiler.fusestatic = False
         notes = list(_find_omissions(mujoco, spec))
+        # The removal of other constraints changes the index of a constraint, so the names are read before.
+        equalities = [
+            one.name or str(i)
+            for i, one in enumerate(spec.equalities)
+            if with_shapes or one.type == mujoco.mjtEq.mjEQ_JOINT
+        ]
         if not with_shapes:
             _remove_unused_elements(mujoco, spec)
         model = compile_spec(spec)
-        reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name)
+        reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name, equalities)
         tree = reader.make_tree()
     except UnicodeDecodeError as error:
         message = "this MJCF contains a name that is not UTF-8"
@@ -371,11 +377,12 @@ def _find_unused_elements(spec: Any) -> Iterator[tuple[str, list[Any]]]:
 
 def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
     """Yield the parts that the tree does not represent, except equalities between joints."""
+    disabled = _disables_equalities(mujoco, spec.option)
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
             kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
             what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot represent"
-            yield MjcfRemark(what, f"equality {one.name or i}", moves=bool(one.active))
+            yield MjcfRemark(what, f"equality {one.name or i}", moves=bool(one.active) and not disabled)
     useless = dict(_find_unused_elements(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
         if useless.pop(words, None):
@@ -386,6 +393,11 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
             for words, found in useless.items()
         )
         yield MjcfRemark(f"kinematics does not use {counts}")
+
+
+def _disables_equalities(mujoco: Any, option: Any) -> bool:
+    off = mujoco.mjtDisableBit
+    return bool(option.disableflags & (int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_EQUALITY)))
 
 
 def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
@@ -432,6 +444,7 @@ class _MjcfReader:
     model: Any
     name: str
     source: str
+    equality_names: list[str]
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
     qpos_index: dict[str, int] = field(default_factory=dict)
     remarks: list[MjcfRemark] = field(default_factory=list)
@@ -552,13 +565,15 @@ class _MjcfReader:
 
     def _read_rules(self) -> Iterator[tuple[str, Mimic]]:
         m, rules = self.model, dict[str, Mimic]()
+        disabled = _disables_equalities(self.mujoco, m.opt)
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
                 continue
-            where = f"equality {m.equality(i).name or i}"
+            where = f"equality {self.equality_names[i]}"
             rule = self._read_rule(i)
-            if not m.eq_active0[i]:
-                self.remarks.append(MjcfRemark("a constraint that is not active", where))
+            if disabled or not m.eq_active0[i]:
+                what = "a constraint that <flag> disables" if disabled else "a constraint that is not active"
+                self.remarks.append(MjcfRemark(what, where))
                 continue
             if rule is None:
                 names = _join_names(
@@ -590,6 +605,21 @@ class _MjcfReader:
         return self._joint_name_by_index[y], Mimic(
             self._joint_name_by_index[x], float(c[1]), float(y0 + c[0] - c[1] * x0)
         )
+
+
+def replace_missing_limits(lower: float, upper: float) -> tuple[float, float]:
+    """Replace infinite limits (m) of a prismatic joint.
+
+    >>> replace_missing_limits(-1.0, math.inf), replace_missing_limits(2500.0, math.inf)
+    ((-1.0, 1000.0), (2500.0, 3500.0))
+    """
+    far = FALLBACK_PRISMATIC_LIMIT
+    low, high = (x if math.isfinite(x) else math.copysign(far, x) for x in (lower, upper))
+    if lower == -math.inf and high <= -far:
+        low = high - far
+    if upper == math.inf and far <= lower < math.inf:
+        high = lower + far
+    return low, high
 
 
 def make_unique(name: str, used_names: set[str]) -> str:

@@ -53,6 +53,7 @@ from urdfkin.urdf.mjcf import (
     depends_on,
     make_fixed_joint,
     make_unique,
+    replace_missing_limits,
     resolve_rule,
 )
 from urdfkin.urdf.sources import USD_SUFFIXES
@@ -1038,15 +1039,15 @@ class _StageReader:
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
+            low, high = replace_missing_limits(lower, upper)
             absent, value = "limits", f"+-{FALLBACK_PRISMATIC_LIMIT:g}"
-            if math.isfinite(lower) or math.isfinite(upper):
-                absent, value = ("an upper limit", "+") if math.isfinite(lower) else ("a lower limit", "-")
-                value += f"{FALLBACK_PRISMATIC_LIMIT:g}"
+            if math.isfinite(lower):
+                absent, value = "an upper limit", f"{high:+g}"
+            elif math.isfinite(upper):
+                absent, value = "a lower limit", f"{low:+g}"
             what = f"a prismatic joint without {absent} gets {value} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
-            lower, upper = (
-                x if math.isfinite(x) else math.copysign(FALLBACK_PRISMATIC_LIMIT, x) for x in (lower, upper)
-            )
+            lower, upper = low, high
         return Limit(lower, upper, rate, math.inf)
 
     def _find_frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -71,17 +71,22 @@ class MjcfReading:
 
 
 def read_mjcf(
-    source: str | bytes | os.PathLike[str], *, with_check_data: bool = True, timeout: float = TIMEOUT
+    source: str | bytes | os.PathLike[str],
+    *,
+    with_check_data: bool = True,
+    timeout: float = TIMEOUT,
+    name: str | None = None,
 ) -> MjcfReading:
     """Read an MJCF file or text in a separate process.
 
-    With `with_check_data`, the process computes data for `check_mjcf_source`. `timeout` is in seconds.
+    With `with_check_data`, the process computes data for `check_mjcf_source`. `timeout` is in seconds. `name`
+    is the name of the source in messages, for example `<stdin>`.
 
     Raises:
         InputError: MuJoCo or urdfkin does not accept the file, or the process ends without a robot.
     """
     version()
-    name = source_name(source)
+    name = source_name(source) if name is None else name
     text = isinstance(source, bytes) or is_text(source)
     path = None if text else str(expand_home(os.fspath(source)))  # type: ignore[arg-type]
     request = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -119,8 +120,15 @@ class Sliders:
         return handle
 
     def _on_update(self, row: SliderRow, handle: Any) -> None:
-        if not self._is_setting:
-            self._on_change(row.index, float(handle.value) / self._scale(row))
+        if self._is_setting:
+            return
+        scale = self._scale(row)
+        # The browser rounds a value at an end of the slider, so the value can be beyond this end.
+        lower, upper = (
+            limit if end == scale * limit else end / scale
+            for end, limit in ((handle.min, row.lower), (handle.max, row.upper))
+        )
+        self._on_change(row.index, min(max(float(handle.value) / scale, lower), upper))
 
     def show(self, values: FloatArray) -> None:
         self._is_setting = True
@@ -146,7 +154,7 @@ class Sliders:
     def _step(self, row: SliderRow, width: float) -> float:
         if row.is_angle:
             return _STEP_DEGREES if self._degrees else _STEP_RADIANS
-        size = width / _MIN_STEPS
+        size = max(width / _MIN_STEPS, sys.float_info.min)
         power = 10.0 ** math.floor(math.log10(size))
         return next(power * digit for digit in (5.0, 2.0, 1.0) if power * digit <= size * (1.0 + 1e-9))
 
@@ -204,12 +212,7 @@ def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
 
 
 def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
-    out = np.array(q, dtype=np.float64)
-    for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
-        for k in range(min(joint.nq, 3)):
-            lower, upper = _limits(joint, math.pi if _is_angle(joint, k) else 1.0)
-            out[at + k] = min(max(out[at + k], lower), upper)
-    return out
+    return np.clip(q, *robot.limits)
 
 
 def format_values(values: FloatArray) -> str:
@@ -450,12 +453,10 @@ class Viewer:
             return
         with self._lock:
             try:
-                text = self.words_of_q.value
+                q = self.words_of_q.value
                 if self._conversion is not None:
-                    q = self._conversion.from_(self._conversion.layout("q").parse(text))
-                else:
-                    q = parse_finite(self.robot.tree, text, "q", warn=False)
-                self.q = q.copy()
+                    q = self._conversion.from_(self._conversion.layout("q").parse(q))
+                self.q = parse_finite(self.robot.tree, q, "q", warn=False).copy()
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return

@@ -277,6 +277,32 @@ def test_an_invalid_convention_file_is_an_error_with_the_place(
     assert "mine" in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["mujoco", "isaaclab"])
+@pytest.mark.parametrize("add", [-1, 1])
+def test_a_jacobian_or_hessian_of_another_robot_is_refused(name: str, add: int) -> None:
+    robot = urdfkin.load("a1", verify=False)
+    q, n = robot.neutral(), robot.nv
+    conversion, J = robot.convention(name), np.ones((6, n + add))
+    for call in (conversion.columns, conversion.jacobian, conversion.from_jacobian):
+        with pytest.raises(InputError, match=rf"J must have the shape \(..., rows, {n}\): found"):
+            call(q, J)
+    with pytest.raises(InputError, match="J must have the shape"):
+        conversion.hessian(q, J, np.ones((6, n, n)))
+    with pytest.raises(InputError, match="H must have the shape"):
+        conversion.hessian(q, np.ones((6, n)), np.ones((6, 1, 1)))
+
+
+def test_a_six_vector_or_jacobian_with_a_masked_complex_or_text_value_is_refused() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    conversion, J = robot.convention("drake"), np.ones((6, 6))
+    for wrong in (np.ma.array(J, mask=np.eye(6, dtype=bool)), J + 1j, J.astype(str), np.full((6, 6), None)):
+        for call in (conversion.columns, conversion.jacobian, conversion.from_jacobian):
+            with pytest.raises(InputError, match="must be real numbers"):
+                call(robot.neutral(), wrong)
+        with pytest.raises(InputError, match="six-vectors must be real numbers"):
+            conversion.reorder_six_vector(wrong)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

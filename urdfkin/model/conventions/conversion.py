@@ -689,7 +689,7 @@ class Conversion:
         >>> drake.reorder_six_vector([1, 2, 3, 4, 5, 6]).tolist()
         [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
         """
-        array = np.asarray(x, dtype=np.float64)
+        array = as_floats(x, "six-vectors")
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
         return np.take(array, _ANGULAR_FIRST, axis) if self.angular_first else array
@@ -708,7 +708,7 @@ class Conversion:
             J: (..., rows, nv) matrix.
 
         Raises:
-            InputError: The target program has additional columns for mimic joints.
+            InputError: The target program has additional columns for mimic joints, or J has not nv columns.
         """
         self._refuse_mimic_columns()
         array = _as_matrices(J, "J", self.tree.nv)
