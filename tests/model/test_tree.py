@@ -11,8 +11,11 @@ import pytest
 import urdfkin
 from tests.random_chains import rotation, shift
 from tests.random_chains import z_joint as joint
+from urdfkin.compiled.evaluate import placements
+from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.configuration import from_pinocchio, limit_violations, to_pinocchio
+from urdfkin.model.integration import difference, integrate
 from urdfkin.model.mechanisms.mechanism import pose_difference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree, with_root_joint
 from urdfkin.robot import Robot
@@ -196,6 +199,22 @@ def test_integrate_counts_turns_and_difference_takes_the_shortest_way() -> None:
     turned = robot.integrate("neutral", "neutral, j2s6s200_joint_1=350deg/s")
     assert turned[wheel] == pytest.approx(np.radians(350.0))
     assert robot.difference("neutral", turned)[wheel] == pytest.approx(np.radians(-10.0))
+
+
+@pytest.mark.parametrize("kind", [JointKind.PRISMATIC, JointKind.REVOLUTE, JointKind.CONTINUOUS])
+@pytest.mark.parametrize(("multiplier", "keeps_pose"), [(0.5, False), (0.0, True), (-2.0, None)])
+def test_difference_keeps_full_turns_that_move_a_mimic_joint(
+    kind: JointKind, multiplier: float, keeps_pose: bool | None
+) -> None:
+    keeps_pose = kind.turns if keeps_pose is None else keeps_pose
+    wheel = joint("wheel", kind=JointKind.CONTINUOUS)
+    other = joint("other", kind=kind, mimic=Mimic("wheel", multiplier, 0.1))
+    tree = build_tree("rack", "base", [(wheel, "base", "hub"), (other, "base", "rack")])
+    start, end = np.array([0.2]), np.array([6.0])
+    way = difference(tree, start, end)
+    assert way == pytest.approx([5.8 - math.tau if keeps_pose else 5.8])
+    poses = placements(compile_tree(tree, [1, 2]), np.array([end, integrate(tree, start, way)]))
+    np.testing.assert_allclose(poses[1], poses[0], rtol=0.0, atol=1e-14)
 
 
 # -- limits, and the layout of Pinocchio -----------------------------------------------------------

@@ -2,9 +2,9 @@
 
 For a configuration q with orientations, q + v is meaningless; use `integrate` and `difference` instead of +
 and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
-`integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns. For
-a planar or floating joint, the joint velocity (w, s) is constant in the moving frame, so the joint makes a
-screw motion from the pose (R_0, p_0):
+`integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns,
+unless a full turn moves a mimic joint. For a planar or floating joint, the joint velocity (w, s) is constant
+in the moving frame, so the joint makes a screw motion from the pose (R_0, p_0):
 
     R = R_0 exp(w)
     p = p_0 + R_0 V(w) s
@@ -56,7 +56,8 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the velocities that lead to `end` in one second.
 
-    Continuous, planar and floating joints rotate by at most half a turn.
+    Continuous, planar and floating joints rotate by at most half a turn. A continuous joint makes the full
+    rotation if a full turn of this joint moves a mimic joint to another pose.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -65,7 +66,8 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         q_0, q_1 = (q[..., q_index : q_index + joint.nq] for q in (start, end))
         if joint.nq == 1:
             change = q_1[..., 0] - q_0[..., 0]
-            v[..., v_index] = _shortest(change) if joint.kind is JointKind.CONTINUOUS else change
+            can_wrap = joint.kind is JointKind.CONTINUOUS and _full_turn_keeps_pose(tree, joint)
+            v[..., v_index] = _shortest(change) if can_wrap else change
             continue
         (p_0, R_0), (p_1, R_1) = _pose(joint, q_0), _pose(joint, q_1)
         R_0_inverse = np.swapaxes(R_0, -1, -2)
@@ -90,6 +92,16 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, q_index, v_index) for joint, q_index, v_index in rows if joint.nv]
+
+
+def _full_turn_keeps_pose(tree: KinematicTree, joint: Joint) -> bool:
+    """Return whether the joint's mimic joints have the same pose after a full turn of the joint."""
+    rules = [(other.kind, other.mimic) for other in tree.joints if other.mimic]
+    return all(
+        rule.multiplier.is_integer() if kind.turns else rule.multiplier == 0.0
+        for kind, rule in rules
+        if rule.mimicked_joint == joint.name
+    )
 
 
 def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:

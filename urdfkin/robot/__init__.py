@@ -563,7 +563,8 @@ class Robot(Displayable):
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
         The result is the shortest motion, as in Pinocchio's `difference`. `integrate(start, difference(start,
-        end))` gives the same pose of the robot as `end`.
+        end))` gives the same pose of the robot as `end`. Therefore, a continuous joint makes the full
+        rotation if a full turn of this joint moves a mimic joint to another pose.
 
         Args:
             start: (..., nq) rad, m.
