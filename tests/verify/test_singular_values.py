@@ -390,6 +390,16 @@ def test_lost_directions_and_null_motions_are_null_spaces_of_the_jacobian() -> N
     assert robot.certificate().verified, "the explanation computes unchecked Jacobians"
 
 
+def test_errors_above_all_motions_of_a_long_chain_give_an_explanation() -> None:
+    origins = ('xyz="1 0 0"', 'xyz="1 0 0" rpy="1.5 0 0"')
+    joints = [joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", origins[i % 2]) for i in range(17)]
+    robot, T = urdfs.built(*joints), np.eye(4)
+    T[0, 3] = 1e15
+    one = robot.singular_values(robot.sample(1)[0], "l17", base=BaseMotion(T)).singularity()
+    assert one.rank == 0
+    assert "17 independent joint motions of j0, " in str(one)
+
+
 def test_a_regular_configuration_near_a_singularity_is_not_singular() -> None:
     robot = urdfkin.load("ur5")
     for elbow in (1.0, 1e-6, 1e-10):

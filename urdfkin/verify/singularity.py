@@ -221,7 +221,8 @@ class _SingularityExplainer:
             yield self._describe_null_motion(motions[0, self._moving])
         else:
             moving = np.flatnonzero(self._remove_noise(motions)[:, self._moving].any(axis=0))
-            joints = _join_names([self._names[i] for i in moving])
+            # The noise can exceed all numbers of the motions.
+            joints = _join_names([self._names[i] for i in moving] or self._names)
             frame = self._frame_jacobian.frame
             yield f"{len(motions)} independent joint motions of {joints} do not move {frame}."
 
