@@ -25,6 +25,7 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 from urdfkin.verify.quantities import (
     ACCELERATION,
+    ACCELERATION_BREAKDOWN,
     JACOBIAN,
     PLACEMENT,
     VELOCITY,
@@ -66,7 +67,7 @@ class FrameMotion:
         active_entries: (6, nv) booleans; False for an entry of the Jacobian that is 0 in every configuration.
         breakdown: Contributions of each joint to the acceleration, separately for each term.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
-            robot.
+            robot. The sum of the breakdown is compared with Pinocchio's acceleration.
         unverified_reason: Reason why Pinocchio cannot check the robot, or None.
 
     >>> import urdfkin
@@ -187,6 +188,10 @@ def frame_motion(
         row: call.run_and_locate_error(row.compute_results, call.plan, inputs, reference, base=state)
         for row in validated_quantities()
     }
+    breakdown = call.run_and_locate_error(
+        acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state
+    )
+    checked = {**ours, ACCELERATION_BREAKDOWN: breakdown.total[:, np.newaxis]}
     at_origin = base is None or not base.placement[..., :3, 3].any()
     reason = robot.verifier.find_refusal(call.base)
     placement, velocity, acceleration, jacobian = (
@@ -200,10 +205,8 @@ def frame_motion(
         acceleration,
         jacobian,
         find_active_entries(call.plan, reference, root_at_origin=at_origin)[0],
-        call.run_and_locate_error(
-            acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state
-        ),
-        {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
+        breakdown,
+        {} if reason else {row.name: _check(row, robot, call, results) for row, results in checked.items()},
         reason,
     )
 
