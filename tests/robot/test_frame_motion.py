@@ -131,3 +131,9 @@ def test_in_world_the_manipulability_includes_a_joint_that_only_a_displaced_base
     J = x.jacobian[0, :2]
     assert x.manipulability(slice(0, 3)) == pytest.approx([abs(np.linalg.det(J))], rel=1e-12)
     assert abs(np.linalg.det(J)) > 0.1
+
+
+def test_a_motion_that_is_neither_a_trajectory_nor_arrays_is_an_input_error() -> None:
+    robot = urdfkin.load("planar_two_link")
+    with pytest.raises(urdfkin.InputError, match="motion must be a trajectory, or q, v and a: found None"):
+        frame_motion(robot, None, "tip")  # type: ignore[arg-type]

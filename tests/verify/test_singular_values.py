@@ -327,6 +327,16 @@ def test_the_manipulability_gradient_is_nan_at_a_singularity_and_finite_nearby()
     assert gradient[1, 1] == pytest.approx(lengths * np.cos(0.1), rel=1e-12)
 
 
+def test_the_manipulability_gradient_refuses_the_hessian_of_other_configurations() -> None:
+    robot = urdfkin.load("planar_two_link")
+    q = robot.sample(6).reshape(2, 3, 2)
+    found, H = robot.singular_values(q, "tip", "linear"), robot.hessian(q, "tip")
+    assert (found.manipulability_gradient(H.tolist()) == found.manipulability_gradient(H)).all()
+    for bad in (H.swapaxes(0, 1), H[0], H[..., np.newaxis, :, :, :], H[..., 0], None, H * np.nan):
+        with pytest.raises(InputError, match="H must be"):
+            found.manipulability_gradient(bad)  # type: ignore[arg-type]
+
+
 def test_singular_values_accept_a_base_and_a_batch_shape_and_refuse_invalid_options() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(6).reshape(2, 3, 6)

@@ -1466,13 +1466,15 @@ class Robot(Displayable):
             q: (..., nq) rad, m.
 
         Raises:
-            InputError: the length of `q` is not `nq`.
+            InputError: the length of `q` is not `nq`, or `path` is not a chain or table.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
         >>> arm.select(arm.chain("link_1", "base"), [0.1, 0.2]).tolist()
         [0.1]
         """
+        if not hasattr(path, "coupling"):
+            raise InputError("path must be a result of `chain` or `dh`", found=safe_repr(path))
         return path.coupling.select(self.tree, q)
 
     def dh(

@@ -6,7 +6,7 @@ Pinocchio disagree, the methods of `Robot` raise an error, but `frame_motion` re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import as_str
+from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -179,6 +179,8 @@ def frame_motion(
     ([0.0, 0.9, 0.0, 0.0, 0.0, 1.0], True)
     """
     base = motion.base if isinstance(motion, Trajectory) else None
+    if not isinstance(motion, Trajectory | Iterable):
+        raise InputError("motion must be a trajectory, or q, v and a", found=safe_repr(motion))
     given = (motion.q, motion.v, motion.a) if isinstance(motion, Trajectory) else tuple(motion)
     if len(given) != len("qva"):
         raise InputError("motion must be a trajectory, or q, v and a", found=f"{len(given)} arrays")
