@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import urdfkin
 from tests import urdfs
 from tests.high_precision import mp
+from tests.random_chains import rotation, shift
 from tests.urdfs import joint, limit
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
@@ -428,6 +429,17 @@ def test_the_explanation_for_an_arm_that_is_singular_everywhere_is_the_arm() -> 
     )
     stretched = found(robot, np.zeros(5), "linear")
     assert stretched.lost_directions.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize("base", [None, BaseMotion(shift(1.0, 2.0, 3.0) @ rotation("z", 0.7))])
+def test_an_arm_whose_only_axis_always_meets_the_origin_loses_no_direction(base: BaseMotion | None) -> None:
+    robot = urdfs.built(
+        joint("turn", "continuous", "base", "arm", 'xyz="0 0 0.5" rpy="0 0 0.4"', "-1 0 0"),
+        joint("wrist", "continuous", "arm", "tip", 'xyz="0.5 0 0" rpy="0.4 0 1.57"', "0 0 -1"),
+    )
+    one = robot.singular_values([0.3, -1.1], "tip", "linear", base=base).singularity()
+    assert (one.rank, one.full_rank, one.lost_directions.shape) == (0, 1, (0, 6))
+    assert one.reasons[0].startswith("The Jacobian has the same rank at random configurations.")
 
 
 def test_the_rotation_of_the_base_rotates_the_lost_direction() -> None:
