@@ -13,7 +13,7 @@ from tests.random_chains import rotation, shift
 from tests.random_chains import z_joint as joint
 from urdfkin.compiled.evaluate import placements
 from urdfkin.compiled.plan import compile_tree
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors import InputError, RangeError, UnknownNameError
 from urdfkin.model.configuration import from_pinocchio, limit_violations, to_pinocchio
 from urdfkin.model.integration import difference, integrate
 from urdfkin.model.mechanisms.mechanism import pose_difference
@@ -199,6 +199,31 @@ def test_integrate_counts_turns_and_difference_takes_the_shortest_way() -> None:
     turned = robot.integrate("neutral", "neutral, j2s6s200_joint_1=350deg/s")
     assert turned[wheel] == pytest.approx(np.radians(350.0))
     assert robot.difference("neutral", turned)[wheel] == pytest.approx(np.radians(-10.0))
+
+
+@pytest.mark.parametrize(
+    ("root", "q", "v"),
+    [
+        (None, "joint_1=1.7e308, joint_2=0", "joint_1=1.7e308, joint_2=0"),
+        ("planar", "neutral", "neutral, root_joint.vx=1, root_joint.wz=1e160"),
+        ("floating", "neutral", "neutral, root_joint.wx=1e160"),
+        ("floating", "neutral, root_joint.x=1.7e308", "neutral, root_joint.vx=1.7e308"),
+    ],
+)
+def test_integrate_refuses_a_result_outside_the_range_of_doubles(root: str | None, q: str, v: str) -> None:
+    robot = urdfkin.load("planar_two_link", root_joint=root, verify=False)
+    with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+        robot.integrate(q, v)
+
+
+@pytest.mark.parametrize(
+    ("root", "change"), [(None, "joint_1=1.7e308"), ("planar", "root_joint.angle=1e160"),
+                         ("floating", "root_joint.x=1.7e308")],
+)  # fmt: skip
+def test_difference_refuses_a_result_outside_the_range_of_doubles(root: str | None, change: str) -> None:
+    robot = urdfkin.load("planar_two_link", root_joint=root, verify=False)
+    with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+        robot.difference(f"neutral, {change.replace('=', '=-')}", f"neutral, {change}")
 
 
 @pytest.mark.parametrize("kind", [JointKind.PRISMATIC, JointKind.REVOLUTE, JointKind.CONTINUOUS])

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.kinematics.rotation import (
     exp_rotation,
     log_rotation,
@@ -33,6 +33,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 _SERIES_SQUARED_ANGLE = 0.25
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
     """Return the configuration after one second at constant velocities."""
     shape = _common_shape(q, v)
@@ -49,10 +50,11 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
         if joint.kind is JointKind.PLANAR:
             block[...] = np.concatenate((p[..., :2], block[..., 2:] + w[..., 2:]), axis=-1)
         else:
-            block[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
-    return out
+            block[...] = np.concatenate((p, quaternion_of(_require_finite(R @ exp_rotation(w)))), axis=-1)
+    return _require_finite(out)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the velocities that lead to `end` in one second.
 
@@ -78,7 +80,13 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         s = np.linalg.solve(_V(w), R_0_inverse @ (p_1 - p_0)[..., np.newaxis])[..., 0]
         parts = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
         v[..., v_index : v_index + joint.nv] = np.concatenate(parts, axis=-1)
-    return v
+    return _require_finite(v)
+
+
+def _require_finite(x: FloatArray) -> FloatArray:
+    if not np.isfinite(x).all():
+        raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
+    return x
 
 
 def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
@@ -106,7 +114,8 @@ def _full_turn_keeps_pose(tree: KinematicTree, joint: Joint) -> bool:
 
 def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     p, orientation = _split_block(joint, block)
-    return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
+    make_rotation = rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation
+    return p, _require_finite(make_rotation(orientation))
 
 
 def _split_block(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:

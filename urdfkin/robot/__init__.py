@@ -559,6 +559,7 @@ class Robot(Displayable):
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").integrate([0.5, 0.0], [1.0, -1.0]).tolist()
@@ -591,6 +592,7 @@ class Robot(Displayable):
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").difference([0.5, 0.0], [1.5, -1.0]).tolist()
