@@ -19,7 +19,8 @@ import math
 
 import numpy as np
 
-from urdfkin.errors import InputError, RangeError
+from urdfkin.errors import InputError
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.rotation import (
     exp_rotation,
     log_rotation,
@@ -50,8 +51,8 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
         if joint.kind is JointKind.PLANAR:
             block[...] = np.concatenate((p[..., :2], block[..., 2:] + w[..., 2:]), axis=-1)
         else:
-            block[...] = np.concatenate((p, quaternion_of(_require_finite(R @ exp_rotation(w)))), axis=-1)
-    return _require_finite(out)
+            block[...] = np.concatenate((p, quaternion_of(check_range(R @ exp_rotation(w)))), axis=-1)
+    return check_range(out)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -80,13 +81,7 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         s = np.linalg.solve(_V(w), R_0_inverse @ (p_1 - p_0)[..., np.newaxis])[..., 0]
         parts = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
         v[..., v_index : v_index + joint.nv] = np.concatenate(parts, axis=-1)
-    return _require_finite(v)
-
-
-def _require_finite(x: FloatArray) -> FloatArray:
-    if not np.isfinite(x).all():
-        raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-    return x
+    return check_range(v)
 
 
 def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
@@ -115,7 +110,7 @@ def _full_turn_keeps_pose(tree: KinematicTree, joint: Joint) -> bool:
 def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     p, orientation = _split_block(joint, block)
     make_rotation = rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation
-    return p, _require_finite(make_rotation(orientation))
+    return p, check_range(make_rotation(orientation))
 
 
 def _split_block(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
