@@ -12,7 +12,7 @@ import pytest
 import urdfkin
 from tests.laws.subjects import state
 from tests.robots.odd_urdfs import urdf_of
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors import InputError, RangeError, UnknownNameError
 from urdfkin.export import c, compiled_frame
 from urdfkin.export.code import exportable_quantities
 from urdfkin.export.compiled_frame import NoCompilerError, load_library
@@ -109,6 +109,23 @@ def test_a_compiled_frame_refuses_values_that_are_not_finite_and_wrong_shapes(ar
         fast.jacobian(np.zeros(2), out=np.empty(3))
     with pytest.raises(UnknownNameError):
         arm.compile("nowhere")
+
+
+@needs_compiler
+@pytest.mark.parametrize("n", [1, 3, 40])
+def test_a_compiled_frame_refuses_large_velocities_with_a_result_outside_the_range(
+    arm: Robot, n: int
+) -> None:
+    fast, q, v, a = arm.compile(arm.tip_frame), *np.zeros((3, n, 2))
+    out = np.empty((n, 6))
+    for k in (0, n - 1):
+        v[k] = 1e200
+        with pytest.raises(RangeError, match="leaves the range of double precision"):
+            fast.acceleration(q, v, a, out=out)
+        with pytest.raises(RangeError, match="leaves the range of double precision"):
+            fast.acceleration(q[k], v[k], a[k])
+        assert np.isfinite(fast.velocity(q, v)).all()  # These results are inside the range.
+        v[k] = 0.0
 
 
 def test_arrays_with_and_without_conversion_give_equal_results_and_errors() -> None:

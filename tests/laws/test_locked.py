@@ -184,6 +184,12 @@ def test_pinocchio_reads_the_complete_text_and_reduces_the_model_of_a_locked_rob
     assert locked.to_pinocchio(np.arange(7.0)).tolist() == list(range(7))
 
 
+def test_a_model_that_pinocchio_cannot_reduce_is_an_oracle_error() -> None:
+    robot = urdfkin.load("panda", mimic=False).with_locked_joints({"panda_finger_joint1": 0.04})
+    with pytest.raises(OracleError, match="Pinocchio cannot lock joints of this robot"):
+        robot.pinocchio_model(mimic=True)
+
+
 @pytest.mark.parametrize("oracle", [PINOCCHIO, MUJOCO])
 @pytest.mark.parametrize("mistake", ["value", "mimic", "sense", "free"])
 def test_both_oracles_detect_a_wrongly_locked_tree(mistake: str, oracle: OracleLibrary) -> None:

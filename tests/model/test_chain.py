@@ -221,3 +221,9 @@ def test_the_jacobian_columns_of_a_path_are_difference_quotients() -> None:
 def test_an_elementary_motion_by_zero_is_the_identity() -> None:
     zero = Path((A, *MOTIONS)).poses(np.zeros(len(MOTIONS)))
     np.testing.assert_array_equal(zero, A)
+
+
+def test_select_refuses_the_name_of_a_frame_instead_of_a_chain() -> None:
+    robot = urdfkin.load("planar_two_link")
+    with pytest.raises(InputError, match="path must be a result of `chain` or `dh`: found 'tip'"):
+        robot.select("tip", [0.1, 0.2])  # type: ignore[arg-type]

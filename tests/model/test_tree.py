@@ -11,8 +11,11 @@ import pytest
 import urdfkin
 from tests.random_chains import rotation, shift
 from tests.random_chains import z_joint as joint
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.compiled.evaluate import placements
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.errors import InputError, RangeError, UnknownNameError
 from urdfkin.model.configuration import from_pinocchio, limit_violations, to_pinocchio
+from urdfkin.model.integration import difference, integrate
 from urdfkin.model.mechanisms.mechanism import pose_difference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree, with_root_joint
 from urdfkin.robot import Robot
@@ -196,6 +199,47 @@ def test_integrate_counts_turns_and_difference_takes_the_shortest_way() -> None:
     turned = robot.integrate("neutral", "neutral, j2s6s200_joint_1=350deg/s")
     assert turned[wheel] == pytest.approx(np.radians(350.0))
     assert robot.difference("neutral", turned)[wheel] == pytest.approx(np.radians(-10.0))
+
+
+@pytest.mark.parametrize(
+    ("root", "q", "v"),
+    [
+        (None, "joint_1=1.7e308, joint_2=0", "joint_1=1.7e308, joint_2=0"),
+        ("planar", "neutral", "neutral, root_joint.vx=1, root_joint.wz=1e160"),
+        ("floating", "neutral", "neutral, root_joint.wx=1e160"),
+        ("floating", "neutral, root_joint.x=1.7e308", "neutral, root_joint.vx=1.7e308"),
+    ],
+)
+def test_integrate_refuses_a_result_outside_the_range_of_doubles(root: str | None, q: str, v: str) -> None:
+    robot = urdfkin.load("planar_two_link", root_joint=root, verify=False)
+    with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+        robot.integrate(q, v)
+
+
+@pytest.mark.parametrize(
+    ("root", "change"), [(None, "joint_1=1.7e308"), ("planar", "root_joint.angle=1e160"),
+                         ("floating", "root_joint.x=1.7e308")],
+)  # fmt: skip
+def test_difference_refuses_a_result_outside_the_range_of_doubles(root: str | None, change: str) -> None:
+    robot = urdfkin.load("planar_two_link", root_joint=root, verify=False)
+    with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+        robot.difference(f"neutral, {change.replace('=', '=-')}", f"neutral, {change}")
+
+
+@pytest.mark.parametrize("kind", [JointKind.PRISMATIC, JointKind.REVOLUTE, JointKind.CONTINUOUS])
+@pytest.mark.parametrize(("multiplier", "keeps_pose"), [(0.5, False), (0.0, True), (-2.0, None)])
+def test_difference_keeps_full_turns_that_move_a_mimic_joint(
+    kind: JointKind, multiplier: float, keeps_pose: bool | None
+) -> None:
+    keeps_pose = kind.turns if keeps_pose is None else keeps_pose
+    wheel = joint("wheel", kind=JointKind.CONTINUOUS)
+    other = joint("other", kind=kind, mimic=Mimic("wheel", multiplier, 0.1))
+    tree = build_tree("rack", "base", [(wheel, "base", "hub"), (other, "base", "rack")])
+    start, end = np.array([0.2]), np.array([6.0])
+    way = difference(tree, start, end)
+    assert way == pytest.approx([5.8 - math.tau if keeps_pose else 5.8])
+    poses = placements(compile_tree(tree, [1, 2]), np.array([end, integrate(tree, start, way)]))
+    np.testing.assert_allclose(poses[1], poses[0], rtol=0.0, atol=1e-14)
 
 
 # -- limits, and the layout of Pinocchio -----------------------------------------------------------

@@ -1,5 +1,6 @@
 """The motion of a frame consists of the robot's results, and reports a disagreement with Pinocchio."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import urdfkin
 from tests.laws.subjects import state
 from tests.laws.test_imu import moving_base
 from tests.verify.test_singular_values import ROWS, SLIDE
+from urdfkin.compiled import breakdown
+from urdfkin.compiled.breakdown import AccelerationBreakdown
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -53,6 +56,21 @@ def test_a_disagreement_of_a_frame_motion_is_stored_and_raises_no_error(
     assert not x.agrees
     assert (x.checks["velocity"].bound_ratio > 1.0).all()
     assert (x.checks["placement"].bound_ratio < 1.0).all()
+
+
+def test_a_wrong_breakdown_of_a_frame_motion_is_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = urdfkin.load("panda")
+    right = breakdown.acceleration_breakdown
+
+    def wrong(*args: Any) -> AccelerationBreakdown:
+        found = right(*args)
+        return replace(found, terms=found.terms * (1.0 + 1e-10))
+
+    monkeypatch.setattr("urdfkin.robot.frame_motion.acceleration_breakdown", wrong)
+    x = frame_motion(robot, state(robot, N, 0), robot.tip_frame)
+    assert not x.agrees
+    assert (x.checks["acceleration breakdown"].bound_ratio > 1.0).all()
+    assert (x.checks["acceleration"].bound_ratio < 1.0).all()
 
 
 def test_manipulability_is_the_square_root_of_the_determinant_of_j_times_j_transposed() -> None:
@@ -113,3 +131,9 @@ def test_in_world_the_manipulability_includes_a_joint_that_only_a_displaced_base
     J = x.jacobian[0, :2]
     assert x.manipulability(slice(0, 3)) == pytest.approx([abs(np.linalg.det(J))], rel=1e-12)
     assert abs(np.linalg.det(J)) > 0.1
+
+
+def test_a_motion_that_is_neither_a_trajectory_nor_arrays_is_an_input_error() -> None:
+    robot = urdfkin.load("planar_two_link")
+    with pytest.raises(urdfkin.InputError, match="motion must be a trajectory, or q, v and a: found None"):
+        frame_motion(robot, None, "tip")  # type: ignore[arg-type]

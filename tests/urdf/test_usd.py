@@ -1486,6 +1486,20 @@ def test_a_joint_that_moves_no_common_link_is_a_difference_with_and_without_roun
 
 
 @pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])
+def test_the_bounds_on_single_precision_are_those_of_the_locked_joints(
+    converted: Read, lock: dict[str, float]
+) -> None:
+    free = converted(urdfkin.load(LONG_SLIDE))
+    at_load, later = converted(urdfkin.load(LONG_SLIDE), lock=lock), free.with_locked_joints(lock)
+    assert free.single is not None
+    assert at_load.single is not None
+    assert later.single is not None
+    np.testing.assert_array_equal(later.single.links, at_load.single.links)
+    np.testing.assert_array_equal(later.single.joints, at_load.single.joints)
+    assert (later.single.joints != free.single.joints).any()
+
+
+@pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])
 def test_locked_joints_may_differ_only_by_rounding(converted: Read, lock: dict[str, float]) -> None:
     text = LONG_SLIDE.replace("1000", "1")
     robot, free = urdfkin.load(text, lock=lock), urdfkin.load(text)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import urdfkin
 from tests import urdfs
 from tests.high_precision import mp
+from tests.random_chains import rotation, shift
 from tests.urdfs import joint, limit
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
@@ -327,6 +328,16 @@ def test_the_manipulability_gradient_is_nan_at_a_singularity_and_finite_nearby()
     assert gradient[1, 1] == pytest.approx(lengths * np.cos(0.1), rel=1e-12)
 
 
+def test_the_manipulability_gradient_refuses_the_hessian_of_other_configurations() -> None:
+    robot = urdfkin.load("planar_two_link")
+    q = robot.sample(6).reshape(2, 3, 2)
+    found, H = robot.singular_values(q, "tip", "linear"), robot.hessian(q, "tip")
+    assert (found.manipulability_gradient(H.tolist()) == found.manipulability_gradient(H)).all()
+    for bad in (H.swapaxes(0, 1), H[0], H[..., np.newaxis, :, :, :], H[..., 0], None, H * np.nan):
+        with pytest.raises(InputError, match="H must be"):
+            found.manipulability_gradient(bad)  # type: ignore[arg-type]
+
+
 def test_singular_values_accept_a_base_and_a_batch_shape_and_refuse_invalid_options() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(6).reshape(2, 3, 6)
@@ -390,6 +401,16 @@ def test_lost_directions_and_null_motions_are_null_spaces_of_the_jacobian() -> N
     assert robot.certificate().verified, "the explanation computes unchecked Jacobians"
 
 
+def test_errors_above_all_motions_of_a_long_chain_give_an_explanation() -> None:
+    origins = ('xyz="1 0 0"', 'xyz="1 0 0" rpy="1.5 0 0"')
+    joints = [joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", origins[i % 2]) for i in range(17)]
+    robot, T = urdfs.built(*joints), np.eye(4)
+    T[0, 3] = 1e15
+    one = robot.singular_values(robot.sample(1)[0], "l17", base=BaseMotion(T)).singularity()
+    assert one.rank == 0
+    assert "17 independent joint motions of j0, " in str(one)
+
+
 def test_a_regular_configuration_near_a_singularity_is_not_singular() -> None:
     robot = urdfkin.load("ur5")
     for elbow in (1.0, 1e-6, 1e-10):
@@ -408,6 +429,17 @@ def test_the_explanation_for_an_arm_that_is_singular_everywhere_is_the_arm() -> 
     )
     stretched = found(robot, np.zeros(5), "linear")
     assert stretched.lost_directions.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize("base", [None, BaseMotion(shift(1.0, 2.0, 3.0) @ rotation("z", 0.7))])
+def test_an_arm_whose_only_axis_always_meets_the_origin_loses_no_direction(base: BaseMotion | None) -> None:
+    robot = urdfs.built(
+        joint("turn", "continuous", "base", "arm", 'xyz="0 0 0.5" rpy="0 0 0.4"', "-1 0 0"),
+        joint("wrist", "continuous", "arm", "tip", 'xyz="0.5 0 0" rpy="0.4 0 1.57"', "0 0 -1"),
+    )
+    one = robot.singular_values([0.3, -1.1], "tip", "linear", base=base).singularity()
+    assert (one.rank, one.full_rank, one.lost_directions.shape) == (0, 1, (0, 6))
+    assert one.reasons[0].startswith("The Jacobian has the same rank at random configurations.")
 
 
 def test_the_rotation_of_the_base_rotates_the_lost_direction() -> None:

@@ -166,7 +166,7 @@ def _compute(
             name, program, reference, inputs, out, threads, buffered=uses_buffer(out) and not keep_in_cache
         )
     if invalid or plan.may_overflow or _base_may_overflow(base):
-        _check_finite(inputs, out)
+        check_finite(inputs, out)
     return out
 
 
@@ -270,7 +270,8 @@ def _base_may_overflow(base: FloatArray) -> bool:
     return base is not FIXED_BASE_STATE and not float(np.abs(base).max(initial=0.0)) < NO_OVERFLOW_BOUND
 
 
-def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+def check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Raise NotFiniteError if an input is not finite, and RangeError if a result is not finite."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))

@@ -15,6 +15,7 @@ import os
 import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -25,11 +26,12 @@ from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
-from urdfkin.compiled.evaluate import compute_in_threads, uses_buffer
+from urdfkin.compiled.evaluate import check_finite, compute_in_threads, uses_buffer
 from urdfkin.compiled.kernel_cache import compile_lock
 from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, aligned_empty
 from urdfkin.compiled.prepared import FastFunction
-from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
+from urdfkin.errors import NotFiniteError
 from urdfkin.export.c import InputLayout, advance_pointers, c_file, fill_template, min_configuration_count
 from urdfkin.export.code import FrameCode, make_unverified_code
 from urdfkin.export.proof import PROOF_SAMPLES
@@ -58,7 +60,7 @@ def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile one function, and load the library.
 
     The library contains a function `task`. Its argument is an array with the fields of `KernelArgs`. The
-    function returns 1 if an input is not finite, else 0.
+    function returns 1 if an input is not finite or too large, else 0.
 
     Raises:
         NoCompilerError: no C compiler is installed, or the compiler rejects the code.
@@ -88,7 +90,7 @@ def _entry_point(code: FrameCode) -> str:
     lines = {
         "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{index}];",
         "look": "        look({width}, {x}, bad);",
-        "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0][0] += 0.0 * {x}[i];",
+        "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0][0] += 0.0 * (GROWTH * {x}[i]);",
     }
     texts = {
         name: "\n".join(
@@ -98,6 +100,7 @@ def _entry_point(code: FrameCode) -> str:
     }
     return fill_template(
         "library.c",
+        growth=repr(sys.float_info.max / NO_OVERFLOW_BOUND),
         N=int(KernelArgs.N),
         OUT=int(KernelArgs.OUT),
         STAGE=int(KernelArgs.BUFFER),
@@ -431,8 +434,6 @@ class CompiledFrame:
         inputs = [np.ascontiguousarray(x) for x in (call.q, *call.rates)]
         result = np.empty((call.n, 1, *row.result_shape(self._tree.nv))) if out is None else out
         self._run(task, row, inputs, result, threads)
-        if self._plan.may_overflow and not np.isfinite(result).all():
-            raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
         return result
 
     def _run(
@@ -453,5 +454,5 @@ class CompiledFrame:
                 arguments[index] = address(x)
             return int(task(arguments))
 
-        if compute_in_threads(compute_block, inputs, out, threads):
-            raise NotFiniteError("q, v and a must be finite")
+        if compute_in_threads(compute_block, inputs, out, threads) or self._plan.may_overflow:
+            check_finite(inputs, out)

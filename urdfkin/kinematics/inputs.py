@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.errors.validators import is_real, safe_repr
 from urdfkin.system.lazy_import import is_instance
 
@@ -50,6 +50,13 @@ def _is_masked(value: object) -> bool:
     if is_instance(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
+
+
+def check_range(result: FloatArray) -> FloatArray:
+    """Return the result of a computation with finite numbers. Raise RangeError if it is not finite."""
+    if not np.isfinite(result).all():
+        raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
+    return result
 
 
 def as_finite(value: ArrayLike, name: str) -> FloatArray:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
-from urdfkin.kinematics.inputs import as_floats
+from urdfkin.kinematics.inputs import as_floats, check_range
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, normalise_quaternions, rotation_from_quaternion
 from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS
 from urdfkin.model.base_motion import BaseMotion
@@ -518,6 +518,7 @@ def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
     return sum(kind.nq_pinocchio for kind in present)
 
 
+@np.errstate(over="ignore")  # RangeError replaces this warning.
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     blocks = [np.zeros((*q.shape[:-1], 0))]
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -528,7 +529,7 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
             own = joint.mimic.multiplier * own + joint.mimic.offset
         if joint.kind.nq_pinocchio > joint.kind.nq:
             own = np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
-        blocks.append(own)
+        blocks.append(check_range(own))
     return np.concatenate(blocks, axis=-1)
 
 

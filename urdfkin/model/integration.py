@@ -2,9 +2,9 @@
 
 For a configuration q with orientations, q + v is meaningless; use `integrate` and `difference` instead of +
 and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
-`integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns. For
-a planar or floating joint, the joint velocity (w, s) is constant in the moving frame, so the joint makes a
-screw motion from the pose (R_0, p_0):
+`integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns,
+unless a full turn moves a mimic joint. For a planar or floating joint, the joint velocity (w, s) is constant
+in the moving frame, so the joint makes a screw motion from the pose (R_0, p_0):
 
     R = R_0 exp(w)
     p = p_0 + R_0 V(w) s
@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.rotation import (
     exp_rotation,
     log_rotation,
@@ -33,6 +34,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 _SERIES_SQUARED_ANGLE = 0.25
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
     """Return the configuration after one second at constant velocities."""
     shape = _common_shape(q, v)
@@ -49,14 +51,16 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
         if joint.kind is JointKind.PLANAR:
             block[...] = np.concatenate((p[..., :2], block[..., 2:] + w[..., 2:]), axis=-1)
         else:
-            block[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
-    return out
+            block[...] = np.concatenate((p, quaternion_of(check_range(R @ exp_rotation(w)))), axis=-1)
+    return check_range(out)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the velocities that lead to `end` in one second.
 
-    Continuous, planar and floating joints rotate by at most half a turn.
+    Continuous, planar and floating joints rotate by at most half a turn. A continuous joint makes the full
+    rotation if a full turn of this joint moves a mimic joint to another pose.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -65,7 +69,8 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         q_0, q_1 = (q[..., q_index : q_index + joint.nq] for q in (start, end))
         if joint.nq == 1:
             change = q_1[..., 0] - q_0[..., 0]
-            v[..., v_index] = _shortest(change) if joint.kind is JointKind.CONTINUOUS else change
+            can_wrap = joint.kind is JointKind.CONTINUOUS and _full_turn_keeps_pose(tree, joint)
+            v[..., v_index] = _shortest(change) if can_wrap else change
             continue
         (p_0, R_0), (p_1, R_1) = _pose(joint, q_0), _pose(joint, q_1)
         R_0_inverse = np.swapaxes(R_0, -1, -2)
@@ -76,7 +81,7 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         s = np.linalg.solve(_V(w), R_0_inverse @ (p_1 - p_0)[..., np.newaxis])[..., 0]
         parts = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
         v[..., v_index : v_index + joint.nv] = np.concatenate(parts, axis=-1)
-    return v
+    return check_range(v)
 
 
 def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
@@ -92,9 +97,20 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
     return [(joint, q_index, v_index) for joint, q_index, v_index in rows if joint.nv]
 
 
+def _full_turn_keeps_pose(tree: KinematicTree, joint: Joint) -> bool:
+    """Return whether the joint's mimic joints have the same pose after a full turn of the joint."""
+    rules = [(other.kind, other.mimic) for other in tree.joints if other.mimic]
+    return all(
+        rule.multiplier.is_integer() if kind.turns else rule.multiplier == 0.0
+        for kind, rule in rules
+        if rule.mimicked_joint == joint.name
+    )
+
+
 def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     p, orientation = _split_block(joint, block)
-    return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
+    make_rotation = rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation
+    return p, check_range(make_rotation(orientation))
 
 
 def _split_block(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:

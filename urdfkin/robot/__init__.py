@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention, Conversion
     from urdfkin.robot.convention_robot import ConventionRobot
     from urdfkin.verify.exact.enclosure import Enclosures
-    from urdfkin.verify.usd_check import SinglePrecisionErrors
+    from urdfkin.verify.usd_check import SinglePrecisionErrors, SingleRoundingTerms
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
@@ -77,7 +77,7 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 #: Number of random configurations that determine the generic rank of a Jacobian.
 _RANK_SAMPLES = 3
 #: `dir(robot)` omits these internal members.
-_INTERNAL_NAMES = {"plan", "verifier"}
+_INTERNAL_NAMES = {"plan", "single_terms", "verifier"}
 #: Maximum number of float64 values in an array.
 #: The number of bytes must fit in 63 bits.
 _MAX_NUMBERS = (2**63 - 1) // 8
@@ -162,8 +162,8 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds on the errors of poses from a USD stage in single precision; None without a USD stage.
-        self.single: SinglePrecisionErrors | None = None
+        #: Terms of `single` for each joint of a USD stage in single precision; None without a USD stage.
+        self.single_terms: SingleRoundingTerms | None = None
         #: USD path of each link's prim (scene object); empty without a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
@@ -215,6 +215,21 @@ class Robot(Displayable):
         if q_0.ndim != 1:
             raise InputError("q of a view must be one configuration", found=f"shape {q_0.shape}")
         return get_hook("a robot in a cell")(self, q_0, as_int(height, "height", 1, 10_000))
+
+    @property
+    def single(self) -> SinglePrecisionErrors | None:
+        """Bounds on the errors of poses from a USD stage in single precision; None without a USD stage.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").single is None
+        True
+        """
+        if self.single_terms is None:
+            return None
+        with import_lock:
+            from urdfkin.verify.usd_check import bound_single_precision_errors
+
+        return bound_single_precision_errors(self.tree, self.single_terms)
 
     # -- description ---------------------------------------------------------------------------------
 
@@ -544,6 +559,7 @@ class Robot(Displayable):
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").integrate([0.5, 0.0], [1.0, -1.0]).tolist()
@@ -563,7 +579,8 @@ class Robot(Displayable):
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
         The result is the shortest motion, as in Pinocchio's `difference`. `integrate(start, difference(start,
-        end))` gives the same pose of the robot as `end`.
+        end))` gives the same pose of the robot as `end`. Therefore, a continuous joint makes the full
+        rotation if a full turn of this joint moves a mimic joint to another pose.
 
         Args:
             start: (..., nq) rad, m.
@@ -575,6 +592,7 @@ class Robot(Displayable):
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").difference([0.5, 0.0], [1.5, -1.0]).tolist()
@@ -1465,13 +1483,15 @@ class Robot(Displayable):
             q: (..., nq) rad, m.
 
         Raises:
-            InputError: the length of `q` is not `nq`.
+            InputError: the length of `q` is not `nq`, or `path` is not a chain or table.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
         >>> arm.select(arm.chain("link_1", "base"), [0.1, 0.2]).tolist()
         [0.1]
         """
+        if not hasattr(path, "coupling"):
+            raise InputError("path must be a result of `chain` or `dh`", found=safe_repr(path))
         return path.coupling.select(self.tree, q)
 
     def dh(

@@ -6,7 +6,7 @@ Pinocchio disagree, the methods of `Robot` raise an error, but `frame_motion` re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import as_str
+from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -25,6 +25,7 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 from urdfkin.verify.quantities import (
     ACCELERATION,
+    ACCELERATION_BREAKDOWN,
     JACOBIAN,
     PLACEMENT,
     VELOCITY,
@@ -66,7 +67,7 @@ class FrameMotion:
         active_entries: (6, nv) booleans; False for an entry of the Jacobian that is 0 in every configuration.
         breakdown: Contributions of each joint to the acceleration, separately for each term.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
-            robot.
+            robot. The sum of the breakdown is compared with Pinocchio's acceleration.
         unverified_reason: Reason why Pinocchio cannot check the robot, or None.
 
     >>> import urdfkin
@@ -178,6 +179,8 @@ def frame_motion(
     ([0.0, 0.9, 0.0, 0.0, 0.0, 1.0], True)
     """
     base = motion.base if isinstance(motion, Trajectory) else None
+    if not isinstance(motion, Trajectory | Iterable):
+        raise InputError("motion must be a trajectory, or q, v and a", found=safe_repr(motion))
     given = (motion.q, motion.v, motion.a) if isinstance(motion, Trajectory) else tuple(motion)
     if len(given) != len("qva"):
         raise InputError("motion must be a trajectory, or q, v and a", found=f"{len(given)} arrays")
@@ -187,6 +190,10 @@ def frame_motion(
         row: call.run_and_locate_error(row.compute_results, call.plan, inputs, reference, base=state)
         for row in validated_quantities()
     }
+    breakdown = call.run_and_locate_error(
+        acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state
+    )
+    checked = {**ours, ACCELERATION_BREAKDOWN: breakdown.total[:, np.newaxis]}
     at_origin = base is None or not base.placement[..., :3, 3].any()
     reason = robot.verifier.find_refusal(call.base)
     placement, velocity, acceleration, jacobian = (
@@ -200,10 +207,8 @@ def frame_motion(
         acceleration,
         jacobian,
         find_active_entries(call.plan, reference, root_at_origin=at_origin)[0],
-        call.run_and_locate_error(
-            acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state
-        ),
-        {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
+        breakdown,
+        {} if reason else {row.name: _check(row, robot, call, results) for row, results in checked.items()},
         reason,
     )
 

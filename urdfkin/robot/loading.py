@@ -268,7 +268,7 @@ def _load_usd(
     import hashlib
 
     from urdfkin.urdf.lint.rules.left_out import make_usd_findings
-    from urdfkin.verify.usd_check import bound_single_precision_errors, check_usd_source, read_usd
+    from urdfkin.verify.usd_check import check_usd_source, read_usd
 
     _reject_xacro_args(xacro_args, "USD")
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
@@ -291,7 +291,7 @@ def _load_usd(
     line, remarks = check_usd_source(verifier, read)
     source_findings = make_usd_findings((*read.remarks, *remarks), name, data)
     robot = make_robot(text, **options, source_findings=source_findings, is_generated=True)
-    robot.single = bound_single_precision_errors(robot.tree, read.answer["single"])
+    robot.single_terms = read.answer["single"]
     robot.prims = read.answer["prims"]
     if checks:
         robot.verifier.source_notes = line

@@ -179,7 +179,15 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_PREFIX + frame.name
-    reduced = pin.buildReducedModel(model, ids, q)
+    try:
+        reduced = pin.buildReducedModel(model, ids, q)
+    except (ValueError, RuntimeError) as error:
+        raise OracleError(
+            "Pinocchio cannot lock joints of this robot",
+            where=str(model.name),
+            found=str(error).strip(),
+            remedy="try mimic=False",
+        ) from error
     for frame in reduced.frames:
         frame.name = frame.name.removeprefix(_LINK_PREFIX)
     return reduced

@@ -28,10 +28,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.kinematics.inputs import as_finite
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
@@ -178,7 +179,7 @@ class SingularValues(Displayable):
             )
         return BoundedArray(value_ratio, np.maximum(_bound_below(least), 1.0), _bound_above(most))
 
-    def manipulability_gradient(self, H: FloatArray) -> FloatArray:
+    def manipulability_gradient(self, H: ArrayLike) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
         The derivative of a singular value is u^T J' v. The vectors u and v are the left and the right
@@ -186,7 +187,11 @@ class SingularValues(Displayable):
         may not exist, and the result is NaN.
 
         Args:
-            H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
+            H: (..., 6, nv, nv) Hessian of the frame in LOCAL_WORLD_ALIGNED, from `Robot.hessian` with the
+                same q and base.
+
+        Raises:
+            InputError: H has another shape or contains a number that is not finite.
 
         >>> import urdfkin
         >>> arm, q = urdfkin.load("planar_two_link"), [0.3, 1.0]
@@ -195,13 +200,19 @@ class SingularValues(Displayable):
         [0.0, 0.1081]
         """
         value = self.values.value
-        count = value.shape[-1]
+        count, nv = value.shape[-1], self.V.shape[-2]
+        derivatives = as_finite(H, "H")
+        if derivatives.shape != (expected := (*value.shape[:-1], 6, nv, nv)):
+            raise InputError(
+                f"H must be the Hessian of the same configurations, {expected}",
+                found=f"shape {derivatives.shape}",
+            )
         other_products = np.ones_like(value)
         for k in range(count):
             other_products[..., k] = _product(np.delete(value, k, axis=-1))
         weights = (self.U * other_products[..., np.newaxis, :]) @ np.swapaxes(self.V, -1, -2)
-        batch, (rows, nv) = weights.shape[:-2], weights.shape[-2:]
-        derivatives = H[..., self.rows, :, :].reshape(*batch, rows * nv, nv)
+        batch, rows = weights.shape[:-2], weights.shape[-2]
+        derivatives = derivatives[..., self.rows, :, :].reshape(*batch, rows * nv, nv)
         gradient: FloatArray = (weights.reshape(*batch, 1, rows * nv) @ derivatives)[..., 0, :]
         if count:
             gradient[self.values.lower[..., -1] <= 0.0] = np.nan

@@ -185,11 +185,13 @@ class _SingularityExplainer:
         The columns span the directions in which the frame moves in no sample.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
-        generic_rank = max(
-            int(np.linalg.matrix_rank(J, tol=_RANK_TOLERANCE * np.linalg.norm(J))) for J in samples
-        )
+        # If an axis passes through the frame's origin at every q, the samples consist of rounding errors.
+        # The bound contains the base's distance from the world's origin, but the samples have no base.
+        noise = min(self._bound_matrix_error(), _RANK_TOLERANCE)
+        tolerances = np.maximum(noise, _RANK_TOLERANCE * np.linalg.norm(samples, axis=(1, 2)))
+        generic_rank = int(np.linalg.matrix_rank(samples, tol=tolerances).max())
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
-        return generic_rank, U[:, int((s > _RANK_TOLERANCE * s[0]).sum()) :]
+        return generic_rank, U[:, int((s > max(noise, _RANK_TOLERANCE * s[0])).sum()) :]
 
     def _remove_noise(self, rows: FloatArray) -> FloatArray:
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
@@ -216,7 +218,8 @@ class _SingularityExplainer:
             yield self._describe_null_motion(motions[0, self._moving])
         else:
             moving = np.flatnonzero(self._remove_noise(motions)[:, self._moving].any(axis=0))
-            joints = _join_names([self._names[i] for i in moving])
+            # The noise can exceed all numbers of the motions.
+            joints = _join_names([self._names[i] for i in moving] or self._names)
             frame = self._frame_jacobian.frame
             yield f"{len(motions)} independent joint motions of {joints} do not move {frame}."
 

@@ -21,7 +21,7 @@ from tests.model.test_named_coordinates import Columns
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.result import Sameness
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors import InputError, RangeError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.conventions import (
@@ -676,3 +676,21 @@ def test_the_methods_of_a_robot_in_a_convention_have_the_argument_names_of_the_r
         named = [one.name for one in theirs if one.kind is one.POSITIONAL_OR_KEYWORD]
         ours = list(inspect.signature(getattr(Robot, name)).parameters)
         assert named == ours[: len(named)], name
+
+
+def test_a_converted_number_outside_the_range_of_doubles_is_an_error() -> None:
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    q, v = robot.neutral(), np.full(robot.nv, 1e200)
+    for name in ("mujoco", "newton", "isaaclab", "drake"):
+        conversion = robot.convention(name)
+        with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+            conversion.to(q, v, v)
+        with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+            conversion.from_(conversion.to(q), v, v)
+    slides = urdfs.built(
+        joint("s", "prismatic", "a", "b", more=limit()),
+        joint("t", "prismatic", "b", "c", more=limit() + mimic("s", 2)),
+    )
+    for to in (slides.to_pinocchio, slides.convention("mujoco").to):
+        with pytest.raises(RangeError, match="a result leaves the range of double precision"):
+            to([1.7e308])

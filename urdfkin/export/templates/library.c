@@ -5,7 +5,8 @@
 
 /* The entry point for urdfkin. Its argument is an array of integers: the number of configurations, the addresses
    of q, v, a and the results, and the address of a buffer. The buffer collects the results of a block before they
-   are written past the caches (0: write them directly). It returns 0, or 1 if an input is not finite. */
+   are written past the caches (0: write them directly). It returns 0, or 1 if an input is not finite or is too large:
+   a result can then overflow. */
 
 /* Numbers in a register, and the instructions that load it and write it past the caches. */
 #if defined(__AVX512F__)
@@ -22,10 +23,13 @@
 #define STREAM _mm_stream_pd
 #endif
 
-/* Check count * LANES numbers: 0 x is 0, or NaN if x is not finite. The four sums are independent, so they run in
-   parallel. The check also loads the inputs of this block into the cache, and requests the bytes that are AHEAD of
-   them. A processor that waits for the memory at each block takes up to half as long again for a robot with many
-   joints off the path. */
+/* A number x is too large if GROWTH x overflows. */
+#define GROWTH @growth@
+
+/* Check count * LANES numbers: 0 (GROWTH x) is 0, or NaN if x is not finite or too large. The four sums are
+   independent, so they run in parallel. The check also loads the inputs of this block into the cache, and requests
+   the bytes that are AHEAD of them. A processor that waits for the memory at each block takes up to half as long
+   again for a robot with many joints off the path. */
 #define SUMS 4
 #define AHEAD 4096
 #define LINE 64
@@ -37,9 +41,9 @@ INLINE void look(size_t count, const double *x, numbers *bad)
     for (size_t i = 0; i < count / SUMS; ++i, at += SUMS) {
         for (size_t to = 0; to < SUMS * sizeof *at; to += LINE)
             __builtin_prefetch((const void *)((uintptr_t)at + AHEAD + to));
-        for (int k = 0; k < SUMS; ++k) bad[k] += 0.0 * at[k];
+        for (int k = 0; k < SUMS; ++k) bad[k] += 0.0 * (GROWTH * at[k]);
     }
-    for (size_t k = 0; k < count % SUMS; ++k) bad[k] += 0.0 * at[k];
+    for (size_t k = 0; k < count % SUMS; ++k) bad[k] += 0.0 * (GROWTH * at[k]);
 }
 
 /* Write whole cache lines, which the processor then does not read first. */

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import as_finite, as_floats
+from urdfkin.kinematics.inputs import as_finite, as_floats, check_range
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
@@ -413,6 +413,7 @@ class Conversion:
     def to(
         self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
     ) -> tuple[FloatArray, ...]: ...
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def to(
         self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
@@ -423,6 +424,7 @@ class Conversion:
         Raises:
             InputError: A length is wrong, or a number is not finite.
             UnknownNameError: A coordinate, joint velocity or named pose is unknown.
+            RangeError: A result leaves the range of double precision.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -437,6 +439,7 @@ class Conversion:
             results.append(self._to_target_rates(inputs[0], inputs[1]))
         if len(inputs) > 2:
             results.append(self._to_target_rates(inputs[0], inputs[2], inputs[1]))
+        results = list(map(check_range, results))
         return results[0] if len(results) == 1 else tuple(results)
 
     @overload
@@ -445,6 +448,7 @@ class Conversion:
     def from_(
         self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
     ) -> tuple[FloatArray, ...]: ...
+    @np.errstate(over="ignore", invalid="ignore")
     def from_(
         self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
@@ -454,6 +458,7 @@ class Conversion:
             InputError: A length is wrong, or a number is not finite.
                 A mimic joint's value contradicts its rule.
                 The norm of a (cos, sin) pair or of a quaternion is not 1 within 1e-6.
+            RangeError: A result leaves the range of double precision.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -470,6 +475,7 @@ class Conversion:
             results.append(self._from_target_rates(results[0], inputs[1]))
         if len(inputs) > 2:
             results.append(self._from_target_rates(results[0], inputs[2], results[1]))
+        results = list(map(check_range, results))
         return results[0] if len(results) == 1 else tuple(results)
 
     def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
