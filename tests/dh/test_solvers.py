@@ -236,7 +236,7 @@ def test_an_arm_that_is_not_an_opw_arm_is_refused(name: str) -> None:
 @pytest.mark.slow
 def test_the_command_prints_opw_parameters_in_the_format_of_the_solvers(tmp_path: Path) -> None:
     result = good("structure kinova --opw 0.001")
-    assert "differs from Pinocchio by at most" in result.text + result.err
+    assert "differs from Pinocchio's by at most" in result.text + result.err
     lines = dict(line.split(": ", 1) for line in result.text.splitlines() if line.startswith("opw_"))
     named = ("geometric_parameters", "joint_offsets", "joint_sign_corrections")
     assert sorted(lines) == [f"opw_kinematics_{name}" for name in named]
