@@ -413,7 +413,6 @@ class Conversion:
     def to(
         self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
     ) -> tuple[FloatArray, ...]: ...
-    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def to(
         self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
@@ -434,11 +433,12 @@ class Conversion:
         True
         """
         inputs = self._parse_inputs(q, v, a)
-        results = [self._to_target_q(inputs[0])]
-        if len(inputs) > 1:
-            results.append(self._to_target_rates(inputs[0], inputs[1]))
-        if len(inputs) > 2:
-            results.append(self._to_target_rates(inputs[0], inputs[2], inputs[1]))
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            results = [self._to_target_q(inputs[0])]
+            if len(inputs) > 1:
+                results.append(self._to_target_rates(inputs[0], inputs[1]))
+            if len(inputs) > 2:
+                results.append(self._to_target_rates(inputs[0], inputs[2], inputs[1]))
         results = list(map(check_range, results))
         return results[0] if len(results) == 1 else tuple(results)
 
@@ -448,7 +448,6 @@ class Conversion:
     def from_(
         self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
     ) -> tuple[FloatArray, ...]: ...
-    @np.errstate(over="ignore", invalid="ignore")
     def from_(
         self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
@@ -470,11 +469,12 @@ class Conversion:
         given = zip((q, v, a), "qva", strict=True)
         inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
         _check_batch_shapes(inputs)
-        results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
-        if len(inputs) > 1:
-            results.append(self._from_target_rates(results[0], inputs[1]))
-        if len(inputs) > 2:
-            results.append(self._from_target_rates(results[0], inputs[2], results[1]))
+        with np.errstate(over="ignore", invalid="ignore"):
+            results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
+            if len(inputs) > 1:
+                results.append(self._from_target_rates(results[0], inputs[1]))
+            if len(inputs) > 2:
+                results.append(self._from_target_rates(results[0], inputs[2], results[1]))
         results = list(map(check_range, results))
         return results[0] if len(results) == 1 else tuple(results)
 
