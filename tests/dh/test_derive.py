@@ -11,6 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+import urdfkin
 from tests.dh.arms import CONVENTIONS, EPS, arm, error_ratio
 from tests.high_precision import mp, turn
 from tests.oracle import TreeOracle
@@ -409,6 +410,12 @@ def test_placement_jacobian_and_acceleration_agree_with_pinocchio(tree: Any, con
         assert np.abs(J[i] - expected[:, columns]).max(initial=0.0) <= bound * rates
         assert np.abs(acc[i] - oracle.acceleration(q[i], v[i], a[i], "tip")).max() <= bound * (1 + rates) ** 2
         np.testing.assert_allclose(vel[i], J[i] @ v_own[i], atol=bound * rates, rtol=0)
+
+
+def test_velocities_of_a_table_refuse_batch_shapes_that_do_not_broadcast() -> None:
+    table = make_dh_table(urdfkin.load("ur5", verify=False).tree, "tool0")
+    with pytest.raises(InputError, match=r"the arguments do not broadcast: found \(3,\), \(2,\)"):
+        velocity(table, np.zeros((3, 6)), np.zeros((2, 6)))
 
 
 def test_batches_are_broadcast_and_numbers_of_values_are_checked() -> None:

@@ -17,6 +17,7 @@ from urdfkin.compiled.evaluate import accelerations, jacobians, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.dh.convert import to_free_tree
 from urdfkin.dh.table import DHTable
+from urdfkin.kinematics.inputs import common_batch_shape
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -89,7 +90,7 @@ def _joint_derivatives(table: DHTable, rates: ConfigurationLike, what: str) -> F
 
 def _flatten(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Return the common batch shape, and arrays (number of configurations, rows)."""
-    shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    shape = common_batch_shape(array.shape[:-1] for array in arrays)
     rows = len(table.rows)
     flat = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]
     return shape, [np.ascontiguousarray(array) for array in flat]

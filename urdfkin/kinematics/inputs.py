@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -57,6 +59,16 @@ def check_range(result: FloatArray) -> FloatArray:
     if not np.isfinite(result).all():
         raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
     return result
+
+
+def common_batch_shape(shapes: Iterable[tuple[int, ...]], what: str = "the arguments") -> tuple[int, ...]:
+    """Return the shape to which batch shapes broadcast. `what` names the arrays in the error."""
+    shapes = list(shapes)
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        found = ", ".join(map(str, shapes))
+        raise InputError(f"the batch shapes of {what} do not broadcast", found=found) from None
 
 
 def as_finite(value: ArrayLike, name: str) -> FloatArray:

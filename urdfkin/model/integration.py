@@ -19,8 +19,7 @@ import math
 
 import numpy as np
 
-from urdfkin.errors import InputError
-from urdfkin.kinematics.inputs import check_range
+from urdfkin.kinematics.inputs import check_range, common_batch_shape
 from urdfkin.kinematics.rotation import (
     exp_rotation,
     log_rotation,
@@ -37,7 +36,7 @@ _SERIES_SQUARED_ANGLE = 0.25
 @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
     """Return the configuration after one second at constant velocities."""
-    shape = _common_shape(q, v)
+    shape = common_batch_shape((q.shape[:-1], v.shape[:-1]))
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, q_index, v_index in _coordinate_joints(tree):
         step = v[..., v_index : v_index + joint.nv]
@@ -62,7 +61,7 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
     Continuous, planar and floating joints rotate by at most half a turn. A continuous joint makes the full
     rotation if a full turn of this joint moves a mimic joint to another pose.
     """
-    shape = _common_shape(start, end)
+    shape = common_batch_shape((start.shape[:-1], end.shape[:-1]))
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
     v = np.empty((*shape, tree.nv))
     for joint, q_index, v_index in _coordinate_joints(tree):
@@ -82,14 +81,6 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
         parts = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
         v[..., v_index : v_index + joint.nv] = np.concatenate(parts, axis=-1)
     return check_range(v)
-
-
-def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
-    except ValueError:
-        found = f"{one.shape[:-1]} and {other.shape[:-1]}"
-        raise InputError("the batch shapes of the arguments do not broadcast", found=found) from None
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.validators import safe_repr
+from urdfkin.kinematics.inputs import common_batch_shape
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.configuration import parse_and_normalise, parse_finite, parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, as_text_or_mapping
@@ -92,11 +93,7 @@ class Call:
             shapes.append(self.base.batch_shape)
         if all(shape == shapes[0] for shape in shapes):
             return shapes[0]
-        try:
-            return np.broadcast_shapes(*shapes)
-        except ValueError:
-            found = ", ".join(str(shape) for shape in shapes)
-            raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
+        return common_batch_shape(shapes, "q, v, a and base")
 
     def _flatten_input(self, array: FloatArray) -> FloatArray:
         width = array.shape[-1]

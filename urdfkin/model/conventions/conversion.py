@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import as_finite, as_floats, check_range
+from urdfkin.kinematics.inputs import as_finite, as_floats, check_range, common_batch_shape
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
@@ -468,7 +468,7 @@ class Conversion:
             raise InputError("`a` can only be converted together with `v`")
         given = zip((q, v, a), "qva", strict=True)
         inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
-        _check_batch_shapes(inputs)
+        common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         with np.errstate(over="ignore", invalid="ignore"):
             results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
             if len(inputs) > 1:
@@ -483,7 +483,7 @@ class Conversion:
             raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", values, strict=True)
         inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
-        _check_batch_shapes(inputs)
+        common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         return inputs
 
     def _check_target(self, value: ConfigurationLike, symbol: str) -> FloatArray:
@@ -910,15 +910,6 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
         )
         for at in range(count)
     ]
-
-
-def _check_batch_shapes(inputs: Sequence[FloatArray]) -> None:
-    shapes = [x.shape[:-1] for x in inputs]
-    try:
-        np.broadcast_shapes(*shapes)
-    except ValueError:
-        found = ", ".join(map(str, shapes))
-        raise InputError("the batch shapes of q, v and a do not broadcast", found=found) from None
 
 
 def _as_matrices(value: ArrayLike, name: str, *columns: int) -> FloatArray:
