@@ -13,6 +13,7 @@ import click
 
 from urdfkin.cli.options import (
     FILE,
+    FILE_OR_FOLDER,
     format_from_suffix,
     frame_option,
     load_robot,
@@ -179,7 +180,7 @@ def vectors_command() -> None:
 @vectors_command.command(
     "write", short_help="Write test vectors into a folder.", epilog=f"Example: {_EXAMPLE}"
 )
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path), required=False)
+@click.argument("folder", metavar="DIR", type=FILE_OR_FOLDER, required=False)
 @click.argument("robots", metavar="[ROBOT]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
     "--catalogue/--no-catalogue",

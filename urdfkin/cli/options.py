@@ -32,8 +32,19 @@ if TYPE_CHECKING:
     from urdfkin.robot.trajectory import Trajectory
     from urdfkin.verify.oracles import OracleName
 
-FILE = click.Path(path_type=Path, dir_okay=False)
-FOLDER = click.Path(path_type=Path, file_okay=False)
+
+class _NonEmptyPath(click.Path):
+    """A path; the empty string is an error, because `Path("")` is the current folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "":
+            self.fail("the path is empty.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+FILE = _NonEmptyPath(path_type=Path, dir_okay=False)
+FOLDER = _NonEmptyPath(path_type=Path, file_okay=False)
+FILE_OR_FOLDER = _NonEmptyPath(path_type=Path)
 
 
 class WholeNumber(click.IntRange):

@@ -185,14 +185,20 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if `write_file` cannot write an output file.
 
-    This check does not detect a full disk; `write_file` does.
+    Two options of a command may not name the same file. This check does not detect a full disk; `write_file`
+    does.
     """
+    context = click.get_current_context(silent=True)
+    targets: set[Path] = set() if context is None else context.meta.setdefault("output files", set())
     for path in filter(None, paths):
         try:
             # `write_file` writes to a device or a pipe directly, without a temporary file.
             if path.exists() and not path.is_file():
                 continue
             target = path.resolve()
+            if target in targets:
+                raise click.UsageError(f"two options write the same file, {str(path)!r}; name two files")
+            targets.add(target)
             refuse_read_only(target)
             with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}."):
                 pass

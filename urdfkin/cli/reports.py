@@ -14,6 +14,7 @@ from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import report_crash, report_error
 from urdfkin.cli.options import (
     FILE,
+    FILE_OR_FOLDER,
     NumberInRange,
     combine,
     markdown_option,
@@ -118,7 +119,7 @@ def report_command() -> None:
 
 
 @report_command.command("show", epilog=f"Example: {EXAMPLE}")
-@click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
+@click.argument("results", metavar="RESULTS.json|DIR", type=FILE_OR_FOLDER, required=False)
 @report_options
 @schema_option("urdfkin.validation.document:VALIDATION", "a report")
 @click.pass_context
@@ -158,8 +159,8 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
     short_help="Compare the reports of two validations.",
     epilog="Example: urdfkin report compare main.json branch.json --markdown comment.md",
 )
-@click.argument("old", metavar="OLD.json", type=click.Path(path_type=Path))
-@click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
+@click.argument("old", metavar="OLD.json", type=FILE_OR_FOLDER)
+@click.argument("new", metavar="NEW.json", type=FILE_OR_FOLDER)
 @click.option(
     "--factor",
     type=NumberInRange(1.0),
@@ -212,7 +213,7 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     short_help="Show how the results of each robot changed over several validations.",
     epilog="Example: urdfkin report history nightly --output history.html",
 )
-@click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=FILE_OR_FOLDER)
 @click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
 @schema_option("urdfkin.report.history:HISTORY", "the data")
 @answer_command(*TEXT_FORMATS, "json")

@@ -13,6 +13,7 @@ import click
 from urdfkin.cli.campaign import progress, warn
 from urdfkin.cli.exit import handle_signals
 from urdfkin.cli.options import (
+    FILE_OR_FOLDER,
     WholeNumber,
     load_options,
     load_robot,
@@ -158,7 +159,7 @@ def _list_quantities_in_help(command: _T) -> _T:
 )
 @click.option(
     "--store",
-    type=click.Path(path_type=Path),
+    type=FILE_OR_FOLDER,
     metavar="DIR",
     help="Folder for the results. To resume an interrupted run, repeat the same command.",
 )

@@ -311,8 +311,10 @@ def find_files(
 ) -> list[str]:
     """Return the files that `argument` names, in sorted order.
 
-    Raise SourceError if no file is found in a folder or for a pattern.
+    Raise SourceError if `argument` is empty, or if no file is found in a folder or for a pattern.
     """
+    if not argument:
+        raise SourceError("the path is empty", remedy="give a file, or `.` for the current folder")
     path = Path(argument)
     if argument == "-" or argument in catalogue():
         return [argument]
