@@ -31,7 +31,7 @@ MISTAKES = {
     "report ''": "'RESULTS.json|DIR': the path is empty",
     "report history ''": "the path is empty",
     "validate ur5 --store ''": "'--store': the path is empty",
-    "validate ur5 --samples 1 --html same.out --json ./same.out": "two options write the same file, 'same.out'",
+    "validate ur5 --html a.out --json ./a.out": "two options write the same file, 'a.out'",
     "same ur5 ur5 --markdown a.md --output a.md": "two options write the same file, 'a.md'; name two files",
     "verify a.py ur5 --junit a.md -o a.md": "two options write the same file, 'a.md'",
     f"info {__file__}": "URDF105 error: not well-formed XML",

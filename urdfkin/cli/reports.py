@@ -178,7 +178,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     - The run passed before and fails now, or it was interrupted now.
     - A robot is missing, its verdict is worse, or it is new and not verified.
     - More results are outside their bound, or results of a new quantity are.
-    - A quantity or table is no longer compared, or there are fewer samples or results.
+    - A quantity or table is no longer compared, or not with the second oracle.
+    - There are fewer samples or results.
     - A bound is wider for the same joints.
     - The largest disagreement of a quantity grew by more than --factor,
       and is above 2 eps*scale (the error of a single rounding).

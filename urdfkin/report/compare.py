@@ -9,7 +9,7 @@ A change is a regression in these cases:
 - A robot that is only in the new report is not verified.
 - More results lie outside their bound.
 - A quantity that is only in the new report has results outside their bound.
-- A quantity or a table is no longer compared.
+- A quantity or a table is no longer compared, or not with the second oracle.
 - There are fewer samples or fewer results.
 - A bound is wider, although the robot has the same joints.
 - The worst disagreement grew by more than a given factor, and exceeds the error of a single rounding.
@@ -22,6 +22,7 @@ mimic rule. A renamed file is not a regression: robots are matched by the robot 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypedDict, cast
@@ -360,6 +361,7 @@ def _robot(source: str, old: ReportedRobot, new: ReportedRobot, factor: float) -
         yield ReportChange(source, what, was, now)
     yield from _tables(source, old, new)
     yield from _findings(source, old, new)
+    yield from _second_oracle(source, old, new)
     same = old["joints"] == new["joints"]
     before = {check_name(check): check for check in old["checks"]}
     after = {check_name(check): check for check in new["checks"]}
@@ -379,6 +381,18 @@ def _tables(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[Rep
         if ends[0] != ends[1]:
             was, now = ("compared" if end else "" for end in ends)
             yield ReportChange(source, f"tables from {base} to {tip}", was, now, regression=ends[0])
+
+
+def _second_oracle(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[ReportChange]:
+    before, after = (
+        Counter(check["second_oracle"]["by"] for check in robot["checks"] if "second_oracle" in check)
+        for robot in (old, new)
+    )
+    for name in sorted(before | after):
+        if before[name] != after[name]:
+            was, now = (str(counts[name] or "") for counts in (before, after))
+            lost = after[name] < before[name]
+            yield ReportChange(source, f"comparisons with {name}", was, now, regression=lost)
 
 
 def _check(
