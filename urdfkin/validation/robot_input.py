@@ -128,10 +128,21 @@ def make_robot_inputs(
                 name = unambiguous_path(Path(robot))
             else:
                 name = robot if isinstance(robot, str) else f"<{type(robot).__name__}>"
-            origin = robot.origin if isinstance(robot, Robot) else Origin(name, mimic, root_joint)
+            origin = Origin(name, mimic, root_joint, _as_texts(xacro_args), lock=_as_numbers(lock))
+            origin = robot.origin if isinstance(robot, Robot) else origin
             robot_inputs.append(RobotInput(b"", origin))
             errors[i] = error
     return robot_inputs, errors
+
+
+def _as_texts(xacro_args: Mapping[str, object] | None) -> tuple[tuple[str, str], ...]:
+    return tuple((name, str(value)) for name, value in (xacro_args or {}).items())
+
+
+def _as_numbers(lock: str | Mapping[str, ArrayLike]) -> tuple[tuple[str, float], ...]:
+    """Return the locks with one number, for the command of a robot that cannot be loaded."""
+    values = lock.items() if isinstance(lock, Mapping) else ()
+    return tuple((name, float(value)) for name, value in values if isinstance(value, int | float | str))
 
 
 def make_robot_input(
