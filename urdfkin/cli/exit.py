@@ -40,17 +40,21 @@ class Stop:
         return default if self.signal is None or default == 1 else 128 + self.signal
 
     def interrupting(self, function: Callable[[_T], None]) -> Callable[[_T], None]:
-        """Return `function` with a check for a signal, which raises KeyboardInterrupt.
-
-        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
-        """
+        """Return `function` with a call of `raise_if_signal` before it."""
 
         def call(argument: _T) -> None:
-            if self.signal is not None:
-                raise KeyboardInterrupt
+            self.raise_if_signal()
             function(argument)
 
         return call
+
+    def raise_if_signal(self) -> None:
+        """Raise KeyboardInterrupt if a signal has arrived.
+
+        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
+        """
+        if self.signal is not None:
+            raise KeyboardInterrupt
 
 
 @contextmanager

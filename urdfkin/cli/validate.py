@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -51,6 +51,7 @@ def study_all(
     shard: str | None = None,
     retry: bool = False,
     how: Mapping[str, Any],
+    raise_if_signal: Callable[[], None] = lambda: None,
 ) -> ValidationReport:
     """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
@@ -67,6 +68,7 @@ def study_all(
     try:
         with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
+                raise_if_signal()
                 if not robot.error_stats or parts[i].start > 0:
                     continue
                 found = None if results is None else results.read(i)
@@ -272,7 +274,10 @@ def validate_command(
         if with_study and not report.interrupted:
             settings = StudySettings(accuracy_samples, options["seed"], accuracy_moving_base)
             retries = retry is not None
-            report = study_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
+            report = study_all(
+                report, given, settings, store=store, shard=shard, retry=retries, how=how,
+                raise_if_signal=stop.raise_if_signal,
+            )  # fmt: skip
     if shard:
         _say_shard(report, shard, store)
         is_empty = not report.robots and not report.interrupted
