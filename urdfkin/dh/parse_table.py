@@ -54,6 +54,9 @@ _NAMES = {
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
     **dict.fromkeys(("variable", "joint variable"), "variable"),
 }
+#: A heading with a unit in brackets, such as `velocity [deg/s]`.
+_LIMIT_HEADING = re.compile(rf"({'|'.join(LIMIT_KEYS)})\s*[\[(]\s*([^\])]+?)\s*[\])]$", re.IGNORECASE)
+_EFFORT_UNITS = ("N", "Nm", "N m", "N*m", "N·m")
 _KINDS_BY_SIGMA = {"0": "R", "1": "P"}
 _ROW_NUMBERS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
 _CONVENTIONS = {
@@ -266,6 +269,8 @@ def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
 
 def _parse_column(heading: str) -> _Column:
     text = to_plain_text(heading).strip("*` ")
+    if limit := _LIMIT_HEADING.match(text):
+        return _parse_limit_column(limit[1].lower(), limit[2])
     unit = None
     if found := re.search(
         r"[\[(/]\s*(" + "|".join(sorted(UNIT_SHORT_NAMES, key=len, reverse=True)) + r")\s*[\])]?\s*$", text
@@ -279,6 +284,22 @@ def _parse_column(heading: str) -> _Column:
         .lower()
     )
     return _Column(_NAMES.get(text, ""), text, unit, previous)
+
+
+def _parse_limit_column(name: str, unit: str) -> _Column:
+    if name == "effort" and unit in _EFFORT_UNITS:
+        return _Column(name, name)
+    allowed = UNIT_SHORT_NAMES if name != "effort" else {}
+    short = allowed.get(re.sub(r"\s*/\s*s$", "", unit) if name == "velocity" else unit)
+    if short is None:
+        units = {"effort": "[N] or [Nm]", "velocity": "[rad/s], [deg/s], [m/s] or [mm/s]"}
+        raise InputError(
+            "unknown unit in a heading",
+            where="header",
+            found=f"{name} [{unit}]",
+            remedy=f"write {units.get(name, '[rad], [deg], [m] or [mm]')}",
+        )
+    return _Column(name, name, short)
 
 
 # -- the lines around the table ------------------------------------------------------------------------
