@@ -40,10 +40,10 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
 #: Axes with a smaller tilt (rad) count as nearly parallel.
-#: 1 mm of error shifts the normal by 100 mm.
+#: A tilt of 1e-2 amplifies length errors by 100.
 NEARLY_PARALLEL = 1e-2
 
-#: A Hayati row needs a tilt sine below this number.
+#: Largest sine of the tilt for a Hayati row.
 MAX_HAYATI_TILT_SINE = 0.35
 
 
@@ -307,7 +307,7 @@ def _choose_d(
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # A later prismatic joint or the tool compensates any d.
+        # A later prismatic joint or the tool compensates for d.
         # Match the cell a of one Hayati row.
         # Choose the row with the most tilted axes.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))

@@ -48,7 +48,7 @@ def find_reversed_joints(
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
     # The base can compensate for a reversed first joint.
     # The tool can compensate for a reversed last joint.
-    # Therefore, add the opposite directions of these two joints.
+    # Therefore, opposite directions of the end joints are added.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()

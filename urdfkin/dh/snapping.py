@@ -39,7 +39,7 @@ from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, lar
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: Largest permitted tolerance, rad.
-#: A tolerance below 7.5 degrees gives a unique multiple.
+#: Below 7.5 degrees, at most one multiple is near enough.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Sample range (rad, m) of mimicked joints outside the path.

@@ -232,8 +232,8 @@ def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPai
         ik_geo = f", ik-geo's spherical{suffix}" if "spherical wrist" in names else ""
         solutions.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in names:
-        # For three_parallel, axes 2, 3 and 4 must be parallel.
-        # For _two_intersecting, axes 5 and 6 must also intersect.
+        # ik-geo's `three_parallel` requires parallel axes 2, 3 and 4.
+        # `_two_intersecting` also requires that axes 5 and 6 intersect.
         ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if intersect[4] else ''}"
         solvers = ["EAIK"] * any(intersect) + [ik_geo] * (parallel[1] and parallel[2])
         if solvers:
@@ -371,8 +371,8 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
             "the arm is not ortho-parallel with a spherical wrist (OPW)",
             where=where,
             found=reason,
-            remedy="run `urdfkin structure` to see the properties of the arm, or allow a larger"
-            " tolerance (--opw MM)",
+            remedy="run `urdfkin structure` to see the arm's properties, or allow a larger tolerance"
+            " (--opw MM)",
         )
     return best[1]
 

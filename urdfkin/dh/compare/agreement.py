@@ -158,7 +158,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
             "the table and the path have different joints",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"{in_table or 'none'} in the table, {in_urdf or 'none'} in the URDF",
-            remedy="choose a base and a tip so that the path has exactly the joints of the table",
+            remedy="choose a base and a tip with exactly the table's joints on the path",
         )
     check_lengths_of_table(chain, reference)
 

@@ -72,8 +72,8 @@ _OTHER_SIGNS_ERROR_RATIO = 0.5
 _MAX_START_ERROR = 1e-6
 #: Large changes (rad) of two joint offsets.
 #: The fit changes theta_i by +x and theta_{i+1} by -x.
-#: If cos(alpha_i) < 0, the axes have opposite directions.
-#: The fit then changes theta_{i+1} by +x.
+#: If cos(alpha_i) < 0, theta_{i+1} changes by +x.
+#: The two axes then have opposite directions.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: `count` and `beam_width` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)

@@ -196,7 +196,7 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
     # Reversing two or three rows only exchanges the end rows.
-    # The loop above already yields this exchange.
+    # The loop above already yields exchanged rows.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))

@@ -22,8 +22,8 @@ Parts = list[str | Table | Matrix]
 
 #: Tip errors up to this number count as zero.
 #: Unit: rad, or m per m of reach.
-#: Rounding errors of a fit are far smaller.
-#: Rounding errors of data sheets are far larger.
+#: Rounding errors of a fit are far below this number.
+#: Rounding errors of data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
 #: Smallest tip error in `fit_resolution`.
 #: Unit: rad, or m per m of reach.
@@ -401,9 +401,7 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
     elif comparison.is_exact_unfitted:
         parts.append("Every cell agrees with the URDF.")
     elif comparison.is_exact:
-        parts.append(
-            "After the fit of base, tool and joint offsets, every compared cell agrees with the URDF."
-        )
+        parts.append("After the fit, every compared cell agrees with the URDF.")
     if comparison.not_compared and not comparison.is_exact_unfitted:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in comparison.not_compared)
         same = "a change of base, tool or joint offsets has the same effect"

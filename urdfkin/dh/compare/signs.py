@@ -104,7 +104,7 @@ def find_sign_fits(
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
-    # Between nearly coinciding axes, many directions of x are similar.
+    # If axes nearly coincide, many directions of x fit similarly.
     # The fit can rotate x.
     # One alignment per combination of joint signs is therefore enough.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
