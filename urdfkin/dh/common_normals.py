@@ -13,8 +13,8 @@ direction, the six other numbers are unique (Denavit and Hartenberg). The page d
 and nearly parallel axes.
 
 Parallel axes determine only the sum of their offsets d. Coinciding axes determine only the sum of their
-angles theta. `match_axis_transforms` copies these cells from a reference table. One cell is computed from the
-sum instead. In a Hayati row, the axes do not determine d.
+angles theta. `match_axis_transforms` copies these cells from a reference table. One of these cells is
+computed from the sum instead. In a Hayati row, the axes do not determine d.
 """
 
 from __future__ import annotations
@@ -266,7 +266,7 @@ def match_axis_transforms(
     is not copied.
 
     Returns:
-        Transforms, and theta of each pair's first joint.
+        The transforms of the pairs, and theta of each pair's first joint.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):

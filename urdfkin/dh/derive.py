@@ -1,7 +1,7 @@
 """Derive a Denavit-Hartenberg table from a chain of axes.
 
-One pass leads from base to tip. The page docs/dh.md explains the default choices. `DerivationOptions` or a
-reference table can specify other choices.
+The derivation is one pass from base to tip. The page docs/dh.md explains the default choices.
+`DerivationOptions` or a reference table can specify other choices.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ class DerivationOptions:
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
     """Derive a table from a chain.
 
-    `like` is a standard table of the same joints. With `like`, `options.sign` has no effect. Of the values of
-    `options.parallel_offset`, only "first" then has an effect.
+    `like` is a standard table of the same joints. With `like`, `options.sign` has no effect. With `like`,
+    only the value "first" of `options.parallel_offset` has an effect.
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))

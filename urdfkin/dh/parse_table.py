@@ -500,7 +500,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table or a product of exponentials. The latter has the key M."""
+    """Read a table or a product of exponentials. Only a product of exponentials has the key M."""
     data = read_mapping(path)
     return (
         _add_place(screws_from_mapping, data, str(path)) if "M" in data else parse_table_data(data, str(path))

@@ -148,9 +148,9 @@ class ProductOfExponentials(Displayable):
     def path(self) -> Path:
         """The product as rotations about z axes and translations along z axes.
 
-        For a revolute joint, exp([S] q) is A Rz(q) A^-1. For a prismatic joint, it is A Tz(q) A^-1. The z
-        axis of A is along the joint's axis. The constant poses are A_i^-1 A_{i+1}, and the last one is A_n^-1
-        M.
+        For a revolute joint, exp([S] q) is A Rz(q) A^-1. For a prismatic joint, exp([S] q) is A Tz(q) A^-1.
+        The z axis of A is along the joint's axis. The constant poses are A_i^-1 A_{i+1}. The last constant
+        pose is A_n^-1 M.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").path.poses(np.zeros(2))[:3, 3].tolist()

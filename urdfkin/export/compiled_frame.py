@@ -60,8 +60,8 @@ class NoCompilerError(Exception):
 def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile one function, and load the library.
 
-    The library contains a function `task`. Its argument is an array with the fields of `KernelArgs`. The
-    result is 1 if an input is not finite or too large. Otherwise, the result is 0.
+    The library contains a function `task`. The argument of `task` is an array with the fields of
+    `KernelArgs`. `task` returns 1 if an input is not finite or too large. Otherwise, `task` returns 0.
 
     Raises:
         NoCompilerError: no C compiler is installed, or the compiler rejects the code.
@@ -163,7 +163,7 @@ def _compiler_version(compiler: str) -> str:
 
 @cache
 def _processor_features() -> str:
-    """Return the processor's features. Machine code with `-march=native` depends on them."""
+    """Return the processor's features. They determine the result of `-march=native`."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

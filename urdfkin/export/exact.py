@@ -122,7 +122,10 @@ def make_exact_plan(
 
 
 def _rotation_with_z_axis(axis: Vector, z: float) -> Matrix:
-    """Compute `rotation_with_z_axis` for an exact unit vector. The float z is its third component."""
+    """Compute `rotation_with_z_axis` for an exact unit vector.
+
+    The float `z` is the vector's third component.
+    """
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
     scale = -1 / (sign + own)

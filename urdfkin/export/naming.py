@@ -50,7 +50,7 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 def function_prefix(robot: str, frame: str) -> str:
     """Return the prefix of a frame's exported functions.
 
-    The prefix begins with a letter and has at most 52 characters. If two names are too long, the prefix
+    The prefix begins with a letter and has at most 52 characters. If the names are too long, the prefix
     contains only the frame's name.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")

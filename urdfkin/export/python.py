@@ -243,9 +243,9 @@ def _torch_module_code(code: FrameCode) -> str:
 def _rotation_rate_bound(plan: CompiledTree) -> float:
     """Bound a vector's rotation (rad) per change of one coordinate (rad).
 
-    For each coordinate, s is the sum of |multiplier| over revolute joints. These joints follow the coordinate
-    (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the bound is at
-    least 3.
+    For each coordinate, s is a sum of |multiplier|. The sum includes all revolute joints that follow the
+    coordinate (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the
+    bound is at least 3.
 
     Derivation of 3: If one component of a unit quaternion changes by t, the body rotates about a fixed axis.
     In four dimensions, x is the quaternion's angle to the component's coordinate axis. At t = 0, the rotation

@@ -1,7 +1,7 @@
 """Compute the textbook's forward recursion (section 7.7) for any type of number.
 
-The recursion follows one path. At each joint, it translates along the rigid link. The next steps are a
-constant rotation and the joint's motion about or along z.
+The recursion follows one path. At each joint, the recursion translates along the rigid link. The next steps
+are a constant rotation, and the joint's motion about or along z.
 
 | Quantity | Axes of the vectors |
 |---|---|

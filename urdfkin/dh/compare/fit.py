@@ -273,8 +273,8 @@ def _sparse_changes(
 ) -> FloatArray:
     """Return cell changes that remove the tip error.
 
-    The changed table differs from `start` in few cells. A cell with the effect of free parameters stays
-    unchanged.
+    The changed table differs from `start` in few cells. A cell stays unchanged if free parameters have the
+    same effect.
     """
     Q = _orthonormal_basis(free_derivatives)
     remaining = cell_derivatives - Q @ (Q.T @ cell_derivatives)
