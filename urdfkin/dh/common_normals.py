@@ -327,8 +327,8 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    A revolute joint or the base can compensate for another theta. A prismatic joint cannot. Let prismatic
-    joints i + 1 to k follow, and only row k determine phi. Then theta of rows i + 1 to k equals the
+    A revolute joint or the base can compensate for another theta. A prismatic joint cannot. If prismatic
+    joints i + 1 to k follow, row k alone may determine phi. In this case, theta of rows i + 1 to k equals the
     reference.
     """
     own = pairs[i].row.theta - phi_in

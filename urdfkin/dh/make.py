@@ -124,12 +124,12 @@ def make_dh_table(
         last: "tip": the last row ends at the tip if possible. "flange": the last row ends on the last joint's
             axis. The tool leads from this axis to the tip.
         parallel_offset: Selects the rows for the offsets d along consecutive parallel axes. "last": the row
-            of the last of these axes contains the sum of the offsets. "first": the row of the first of these
-            axes contains the sum. "each": row i contains the offset from joint i to joint i + 1.
+            of the last axis contains the sum of the offsets. "first": the row of the first axis contains the
+            sum of the offsets. "each": row i contains the offset to joint i + 1.
         flip: Joints whose positive direction is reversed (`sense` is -1).
-        first: "base": d_1 and theta_1 contain the translation along the first axis and the rotation about
-            this axis. "joint": d_1 and theta_1 are 0. The base transform contains the translation and the
-            rotation (Craig's frame 0).
+        first: "base": d_1 and theta_1 contain translation along and rotation about the first axis. "joint":
+            d_1 and theta_1 are 0. The base transform contains the translation and the rotation (Craig's
+            frame 0).
         sign: Direction of x, except in the last row, where the tip determines x. "theta": |theta| <= pi/2.
             "a": a >= 0; if a is 0, alpha >= 0. "alpha": alpha >= 0; if alpha is 0, a >= 0. If a and alpha
             are 0, the rule for "theta" applies.

@@ -13,8 +13,8 @@ All formats are converted to the same mapping:
 A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
 joint's value. In a modified table, a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's entry `mimic` is
 {mimicked_joint, multiplier, offset}. A row's entry `limit` is {lower, upper, velocity, effort}. The units
-apply to cells, limits, mimic offsets, base and tool. A multiplier is the ratio of two joint values in SI
-units. An effort is in N or N m.
+apply to cells, limits and mimic offsets. The positions of base and tool have the unit `lengths`. A multiplier
+is the ratio of two joint values in SI units. An effort is in N or N m.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ kinds of angles are snapped:
 3. The theta of each row of the derived table.
 
 A changed angle rotates the rest of the chain about a joint's origin. The tip's displacement is at most this
-angle times the tip's distance from the origin.
+angle times the tip's distance.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Define the Denavit-Hartenberg table: rows, base and tool.
 
-A table is a product of two kinds of transforms (section 7.5 of the textbook):
+A table is a product of two kinds of transforms (textbook, section 7.5):
 
     S = Rz(theta) Tz(d)              rotation about a joint's axis, and translation along this axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row

@@ -3,8 +3,8 @@ r"""Convert a table's numbers from text and to text.
 A table object stores metres and radians. Other units are used only when a table is read or written.
 
 The text of a cell is a sum. Examples are `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` and `180°`.
-A term is a number, a multiple of pi, or a multiple of a joint variable. A number or a multiple of pi can have
-a unit. A cell may contain at most one term with a variable.
+A term is a number, or a multiple of pi or of a variable. A number or a multiple of pi can have a unit. A cell
+may contain at most one term with a variable.
 """
 
 from __future__ import annotations

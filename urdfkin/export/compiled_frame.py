@@ -207,9 +207,9 @@ class _ExportedRobot(Protocol):
 class CompiledFrame:
     """Compiled functions for one robot frame: the result of `Robot.compile`.
 
-    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
-    has exactly the same result in a batch and in a single call. A wrong shape and a number that is not finite
-    raise InputError. The machine code is compared with Pinocchio once, on more than a hundred configurations.
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A batch and a
+    single call give exactly the same result. A wrong shape and a number that is not finite raise InputError.
+    The machine code is compared with Pinocchio once, on more than a hundred configurations.
     After `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of a
     `CompiledFrame` as unchecked.
 

@@ -1,8 +1,8 @@
 """Write a C++11 or CUDA header of function templates for any number type.
 
 The number type may be `double`, `float`, or a type for automatic differentiation. The CUDA header has the
-same functions for the host and the device. The CUDA header also has a kernel for batches, and C functions
-that start the kernel.
+same functions for the host and the device. The CUDA header also has a kernel for batches. C functions of the
+header start the kernel.
 """
 
 from __future__ import annotations

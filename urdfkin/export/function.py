@@ -10,13 +10,9 @@ Each function computes one quantity of one frame. These expressions are assigned
 All other expressions are parts of larger expressions.
 
 **Single precision.** `single_bounds` bounds the rounding errors to first order in eps. Each operation or
-constant x_i has the rounding error e_i (`urdfkin.kinematics.roundings`). A result y has this error and this
-bound:
-
-    error = sum of e_i dy/dx_i
-    bound = sum of |e_i dy/dx_i|
-
-A backward pass over the operations computes the derivatives.
+constant x_i has the rounding error e_i (`urdfkin.kinematics.roundings`). The error of a result y is the sum
+of e_i dy/dx_i. The bound is the sum of |e_i dy/dx_i|. A backward pass over the operations computes the
+derivatives.
 """
 
 from __future__ import annotations

@@ -247,10 +247,10 @@ def _rotation_rate_bound(plan: CompiledTree) -> float:
     coordinate (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the
     bound is at least 3.
 
-    Derivation of 3: If one component of a unit quaternion changes by t, the body rotates about a fixed axis.
-    In four dimensions, x is the quaternion's angle to the component's coordinate axis. At t = 0, the rotation
-    angle has the derivatives 2 sin x, -2 sin 2x, 4 sin 3x. The third derivative of a product of F rotated
-    unit vectors is at most:
+    Derivation of 3: One component of a unit quaternion changes by t. The body then rotates about a fixed
+    axis. In four dimensions, x is the quaternion's angle to the component's coordinate axis. At t = 0, the
+    rotation angle has the derivatives 2 sin x, -2 sin 2x, 4 sin 3x. The third derivative of a product of F
+    rotated unit vectors is at most:
 
     `(2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3`
     """

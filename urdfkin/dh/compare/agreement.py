@@ -212,7 +212,7 @@ def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Return a mask (n, 5) that is 1 for cells that the reference contains."""
+    """Return a mask (n, 5): 1 for cells in the reference, else 0."""
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]

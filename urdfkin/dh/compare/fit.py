@@ -68,7 +68,7 @@ _EXACT_FIT_ERROR = 1e-13
 _EXACT_TIP_ERROR = 1e-12
 #: Other joint signs must reduce the error by this factor.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: Maximum tip error of a start table, divided by reach.
+#: Maximum tip error after `_fit_translations`, divided by reach.
 _MAX_START_ERROR = 1e-6
 #: Large changes (rad) of two joint offsets.
 #: The fit changes theta_i by +x and theta_{i+1} by -x.

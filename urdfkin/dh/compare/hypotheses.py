@@ -2,11 +2,10 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape. A shape consists of distances, angles and offsets of consecutive axes.
-`find_better_interpretation` fits at most three interpretations: those with the smallest sums
 
-    |table shape - URDF shape| + cost * number of differences
-
-A difference is a deviation from the file's stated interpretation.
+The score of an interpretation is |table shape - URDF shape| + cost * number of differences. A difference is
+a deviation from the file's stated interpretation. `find_better_interpretation` fits at most the three
+interpretations with the smallest scores.
 """
 
 from __future__ import annotations
@@ -84,12 +83,9 @@ def find_better_interpretation(
 ) -> BetterInterpretation | None:
     """Find another interpretation that fits the URDF.
 
-    The tip error must meet this condition:
-
-        error <= max(tolerance, 0.05 min(stated_error, reach))
-
-    `tolerance` is in metres. `stated_error` is the position error (m) of the file's interpretation after a
-    fit. `data` comes from `mapping_from_text`.
+    The tip error must be at most max(tolerance, 0.05 min(stated_error, reach)). `tolerance` is in metres.
+    `stated_error` is the position error (m) of the file's interpretation after a fit. `data` comes from
+    `mapping_from_text`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)

@@ -190,7 +190,7 @@ class TableComparison:
 
     @property
     def rounding_error(self) -> float:
-        """Largest rounding error of the tip (rad, or m per m of reach and travel)."""
+        """Largest rounding error of the tip. The unit is rad, or m per m of reach and travel."""
         return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
     @property

@@ -6,7 +6,7 @@
 | Hayati rows, or no rows | `Robot` of elementary transforms (Haviland and Corke) |
 
 For MATLAB, the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms have no fifth parameter.
-These transforms ignore theta of a revolute joint and d of a prismatic joint. The code therefore sets each
+These transforms ignore theta of revolute joints and d of prismatic joints. The code therefore sets each
 joint's frame by a matrix. The joint's axis is the z axis. The code is tested in Octave with substitutes for
 the toolbox's classes (`scripts/forms/octave`). The code has not been tested in MATLAB.
 """
