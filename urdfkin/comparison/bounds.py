@@ -68,7 +68,7 @@ class DistanceSearch:
 
     Args:
         as_written: True: the pose of B's root in A's root frame is constant. False: the pose of B's base link
-            in the frame of A's base link is constant.
+            in A's base link frame is constant.
     """
 
     def __init__(
@@ -84,14 +84,14 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: Pose of B's base link in A's root frame, (4, 4).
+        #: B's base link in A's root frame, (4, 4).
         #: A is in its zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: Whether the base link is on the root body, per model.
+        #: Whether the base link is on the root body (A, B).
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether a joint before the base link changes the distances.
+        #: Whether joints before the base link change the distances.
         #: True: `upper_bounds` and `tighten` prove no bound.
         self.unbounded = as_written and not all(self.base_fixed)
 
@@ -165,7 +165,9 @@ class DistanceSearch:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the frame poses of A and B in A's root frame: two (n, frames, 4, 4) arrays.
+        """Return the frame poses (n, frames, 4, 4) of A, and those of B.
+
+        All poses are in A's root frame.
 
         B's poses do not include the transform `FramePair.tool`.
         """
@@ -342,9 +344,9 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and all D_i (n, 3, variables) at the box centers `c`.
+        """Return D (n, 3) and D_i (n, 3, variables) at the box centers.
 
-        The shape of `c` is (n, variables).
+        `c` (n, variables) are the box centers.
         """
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
@@ -357,7 +359,7 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) and the Jacobian (n, 3, nv) of a point.
+        """Return a point's position (n, 3) and Jacobian (n, 3, nv).
 
         `point` (3,) is given in `frame`.
         """

@@ -40,7 +40,7 @@ from urdfkin.verify.oracles import PINOCCHIO, package_versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative and absolute (m or rad) tolerance of a certificate's numbers.
+#: Relative and absolute (m or rad) tolerance of certified numbers.
 #: Two machines can make different rounding errors.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: Relative tolerance of a bound / machine epsilon.

@@ -1,7 +1,7 @@
 """Compare how libraries read a robot file: joints, joint order and link poses.
 
-Each library runs in a separate process. `urdfkin/verify/adapters.py` contains the adapters. For each joint,
-the comparison uses the child link's pose in the parent link's frame.
+Each library runs in a separate process. `urdfkin/verify/adapters.py` contains the adapters. For each
+joint, urdfkin compares the child link's pose in the parent link's frame.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def _compare_reader(
         )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
     # `load` may add a root joint to the text's joints.
-    # So the poses are compared relative to the first common link.
+    # So the poses are relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())

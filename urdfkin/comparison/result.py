@@ -112,7 +112,7 @@ class Interval:
 #: Value of a parameter of a joint or link.
 #: A type or a name is a str. A limit of velocity or effort is a float.
 #: "limits": (lower limit, upper limit).
-#: "idle": (type of the joint, constant joint value in rad or m).
+#: "idle": (joint type, constant joint value in rad or m).
 #: "only in A", "only in B": names of links.
 #: A `Mimic` is a mimic rule.
 #: None: the joint or link lacks this parameter.
@@ -263,7 +263,7 @@ class Tool:
 
 
 #: Result of Pinocchio's check of the bounds.
-#: "not asked": the user requested no check, or no bound exists.
+#: "not asked": no check was requested, or no bound exists.
 #: "not verified": Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _STATE_TEXTS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
@@ -342,7 +342,7 @@ class Sameness(Displayable):
             to these two links.
         rounding: (m, rad) largest distance and angle between matching frames that rounding errors can cause.
         unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
-            distances assume that no joint in this list travels more than 10 m.
+            distances assume that these joints travel at most 10 m.
         single: (m, rad) largest distance and angle between matching frames that single precision can cause.
             None if no file has single precision.
         unexplained: For joints and links of the unchanged models: differences that rounding does not explain.
@@ -354,7 +354,7 @@ class Sameness(Displayable):
         bound_as_written: (m, rad) proven bounds on distance and angle between matching frames of the
             unchanged models. Infinite without a proof. If A or B is a Denavit-Hartenberg table and `after` is
             not empty, only frames with equal names are compared.
-        narrowed: One line for each mimicked joint that can move a mimic joint beyond its limits. The
+        narrowed: One line for each mimicked joint that can move a mimic joint beyond the limits. The
             distances in `frames` include the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
@@ -456,9 +456,9 @@ class Sameness(Displayable):
     def within_single(self) -> bool:
         """Whether single precision can explain the displacement of every frame.
 
-        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
-        small wrong number in a file can also cause a displacement below the limit. Only `up_to_single`
-        proves that rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
+        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A small
+        wrong number can also cause a displacement below the limit. Only `up_to_single` proves that rounding
+        is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -601,7 +601,7 @@ class Sameness(Displayable):
             joints=tuple(joints),
             rules=rules,
         )
-        # Check that B has a coordinate for each joint of A.
+        # Check that each joint of A has a coordinate in B.
         Conversion(tree_a, "", found)
         return found
 
@@ -664,7 +664,7 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
+    """Return the pose (4, 4) of unchanged B's root in A's root frame.
 
     The first true condition determines the pose:
 
@@ -810,7 +810,7 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 def _are_fixed_end_links(alignment: Alignment, frame: FramePair) -> bool:
     # `same` fixes some mimic joints with multiplier 0.
-    # The child link of such a mimic joint is no tool.
+    # The child link of such a joint is no tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle_joint_lock(tree.joints[link - 1]):
             return False
@@ -921,7 +921,8 @@ def remarks(
         for lock in filter(None, map(idle_joint_lock, tree.joints)):
             value = lock.joint.kind.value, lock.value
             found.append(Difference(f"joint {lock.joint.name}", "idle", *_value_pair(which, value)))
-    # A mimic joint of A can move like an independent joint of B.
+    # A mimic joint of A may be independent in B.
+    # The motion can still be the same.
     # For example, B can have the inverse mimic rule.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]

@@ -69,10 +69,10 @@ CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames with a bound on `FINE_GRID`.
 #: Also the maximum number of frames in `_farthest_as_written`.
 MAX_REFINED_FRAMES = 4
-#: Maximum length of a path from the root to a link, m.
+#: Maximum length of a path from root to link, m.
 #: Squares of lengths above 1.3e154 overflow.
 MAX_PATH_METRES = 1e150
-#: Branch and bound ends at: bound <= SHARP_FACTOR * largest distance found.
+#: Stop at: bound <= SHARP_FACTOR * largest distance found.
 SHARP_FACTOR = 1.05
 
 
@@ -361,8 +361,8 @@ class Comparator:
     def _comparable_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
-        # The frame poses of a Denavit-Hartenberg table depend on its convention.
-        # So only links with equal names are compared with a table.
+        # A table's frame poses depend on the Denavit-Hartenberg convention.
+        # So a table is compared by links of equal names.
         return [(a, b) for a, b in pairs if not alignment.has_free_frames or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -485,7 +485,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_REFINED_FRAMES]]
-        # Without a distance above rounding, the angle bound selects the frame.
+        # Without distances above rounding, the angle bound selects the frame.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -505,7 +505,7 @@ class Comparator:
     ) -> Interval:
         """Return a frame's interval.
 
-        `attained` contains the largest distance found (m), and the values of the variables for this distance.
+        `attained` contains the largest distance found (m), and the variables at this distance.
         """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
@@ -810,7 +810,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in alignment.frames}
         self.steps = {step.a: step for step in alignment.steps}
         root_of_b = next((a for a, b in self.pairs.items() if b == 0), 0)
-        #: First links of the compared paths, in A and in B.
+        #: First links of the compared paths in A and B.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (root_of_b, 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -905,8 +905,8 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A wrong link origin also shifts the joint axis relative to P.
-            # The axis in the link's frame does not shift.
+            # A wrong link origin shifts the axis relative to P.
+            # Relative to the link, the axis does not shift.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(
