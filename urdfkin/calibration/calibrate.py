@@ -103,9 +103,9 @@ class Calibration:
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: {parameter index: ratio of uncertainties}, for poorly observable parameters.
-            Numerator: uncertainty at the measured configurations. Denominator: uncertainty at equally many
-            random configurations.
+        poorly_observable: {index of a poorly observable parameter: ratio of uncertainties}. Numerator:
+            uncertainty at the measured configurations. Denominator: uncertainty at equally many random
+            configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -263,8 +263,8 @@ def calibrate(
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "gains":
             the scale factors of the joint values. "origins": six numbers of each joint origin. For a table,
-            "origins" means the cells of the table. The cell beta is fitted only if the next axis is nearly
-            parallel or beta is not 0.
+            "origins" means the cells of the table. Cell beta is fitted only if the next axis is nearly
+            parallel, or beta is not 0.
         noise: Standard deviations of a position coordinate (m) and of a rotation about an axis (rad). By
             default, the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
@@ -277,9 +277,9 @@ def calibrate(
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
-        InputError: an array has a wrong shape, a number is not finite, there are no poses, or positions are
-            not in metres. Also if only one of `q` and `poses` is given. Also if `tip` or `base` is given for
-            a table.
+        InputError: an array has a wrong shape, a number is not finite, or there are no poses. Also if
+            positions are not in metres. Also if only one of `q` and `poses` is given. Also if `tip` or `base`
+            is given for a table.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.

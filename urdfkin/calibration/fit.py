@@ -1,7 +1,7 @@
 """Identify and fit model parameters from measured poses.
 
-**Identifiability.** A parameter change without effect on the measurements cannot be identified. The null
-space of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
+**Identifiability.** A parameter change without effect on the measurements is not identifiable. The null space
+of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
 identifiable parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value. The
 bound takes rounding errors into account (Weyl's inequality). The rank is the number of positive lower bounds.
 The rank needs no tolerance.
@@ -25,7 +25,8 @@ base to tip. Each parameter has a column in the Jacobian.
     next chosen column: the first candidate in the model's order of preference
 
 Columns with shorter remainders are excluded. Fitted parameters with nearly dependent columns can become very
-large. Example: four lengths along nearly parallel axes are hundreds of metres long, and cancel each other.
+large. Four lengths along nearly parallel axes are an example. The lengths could be hundreds of metres, with a
+small sum.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum:
@@ -50,7 +51,7 @@ A pose is an **outlier** if its statistic is too large:
     limit                     without outliers, some statistic exceeds it with a probability of about 1 %
 
 One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
-The steps end without further outliers, or at the maximum number of outliers.
+The steps end without outliers, or at the maximum number of outliers.
 
 **Start values.** The measured poses give start values of base and tool.
 
@@ -274,7 +275,7 @@ class Fit:
         noise: The standard deviations by which the residuals are divided.
         covariance: (k, k) covariance of the fitted parameters, in their units. Infinite for a fit without
             redundancy and without stated noise.
-        redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
+        redundancies: (s, 6) or (s, 3) redundancies 1 - H_ii of the measured coordinates.
         chi_squares: (s,) chi^2 statistic of each pose.
     """
 
@@ -498,8 +499,8 @@ def select_significant(
 def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
     """Return the chi^2 quantile (Wilson and Hilferty, 1931).
 
-    The relative error is below 1 % at the probability 0.99. For at least 3 degrees of freedom and
-    probabilities from 0.9 to 0.99999, it is below 6 %.
+    The relative error is below 1 % at the probability 0.99. From 3 degrees of freedom, the error is below 6 %
+    for probabilities from 0.9 to 0.99999.
     """
     step = 2.0 / (9.0 * degrees_of_freedom)
     return degrees_of_freedom * (1.0 - step + NormalDist().inv_cdf(probability) * math.sqrt(step)) ** 3

@@ -12,8 +12,8 @@ value of a joint. A joint can have a gain g:
     q D            derivative of the tip's pose by g
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip has the same six parameters. Other fixed joints have no parameters. On a path from
-parent to child, the parameters of a later joint have the same effect.
+directly before the tip has the same six parameters. Other fixed joints have no parameters. A later joint's
+parameters have the same effect (on a path from parent to child).
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis
@@ -21,8 +21,8 @@ parent to child, the parameters of a later joint have the same effect.
 
 The parameter z shifts the origin along the joint's axis. A change of rz changes the zero position of a
 revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
-store. `base` and `tool` have six parameters each. The path begins with `base`: pose of the robot's base in
-the instrument's frame. The path ends with `tool`: pose of the target in the tip's frame.
+store. `base` and `tool` have six parameters each. The path begins with `base`: the robot's base in the
+instrument's frame. The path ends with `tool`: the target in the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. Hayati's beta is a fifth parameter in two cases:
 

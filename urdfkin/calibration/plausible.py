@@ -185,8 +185,7 @@ class FitWithData:
     def _joint_parameter_changes(self) -> Iterator[tuple[Parameter, float, float]]:
         """Yield (parameter, change, lower bound of |change|) for moving joints.
 
-        Let only positions be measured, and let a joint axis be near the target in all poses. Such a joint is
-        skipped.
+        Without measured orientations, a joint is skipped if its axis is near the target in all poses.
         """
         model, fitted = self.model, self.full_fit
         near = set[str]()

@@ -5,8 +5,8 @@ The ROS driver of the arm writes the calibration to a YAML file.
 The controller stores Denavit-Hartenberg parameters. Nominally parallel axes of the arm differ by about a
 milliradian. The common normal of these axes is far away. The parameters d of consecutive rows can therefore
 be hundreds of metres. These parameters cancel each other. The driver's program `ur_calibration` shifts the
-link frames along their axes. All offsets are then small. The program writes each joint's pose in the previous
-joint's frame: x, y, z, roll, pitch and yaw.
+link frames along their axes. All offsets are then small. The program writes x, y, z, roll, pitch and yaw of
+each joint in the previous joint's frame.
 
 The order of the rotations is ambiguous:
 

@@ -37,7 +37,7 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
 
     Args:
         data: The original URDF.
-        origins: Dictionary from the name of each changed joint to its new origin, a (4, 4) pose.
+        origins: {name of a changed joint: new origin (4, 4)}.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -108,7 +108,7 @@ class UpdatedURDF:
 
     Attributes:
         robot: The robot before the change.
-        origins: Dictionary from the name of each changed joint to its new origin, a (4, 4) pose.
+        origins: {name of a changed joint: new origin (4, 4)}.
         certificate: Result of Pinocchio's check of the new URDF; None if not checked.
     """
 

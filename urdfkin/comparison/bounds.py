@@ -67,8 +67,8 @@ class DistanceSearch:
     """Search for the largest frame distances.
 
     Args:
-        as_written: True: the pose of B's root in A's root frame is constant. False: the pose of B's base link
-            in A's base link frame is constant.
+        as_written: True: B's root has a constant pose relative to A's root. False: B's base link has a
+            constant pose relative to A's base link.
     """
 
     def __init__(
@@ -165,7 +165,7 @@ class DistanceSearch:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the frame poses (n, frames, 4, 4) of A, and those of B.
+        """Return the frame poses (n, frames, 4, 4) of A and of B.
 
         All poses are in A's root frame.
 

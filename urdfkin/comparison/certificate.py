@@ -196,7 +196,7 @@ class SameCertificate(Header):
         list[DifferenceEntry],
         doc(
             "Differences, in order from the base to the tips. The last entries are joints of only one model,"
-            " and links after different moving joints in A and B."
+            " and links after different moving joints."
         ),
     ]
     remarks: Annotated[

@@ -122,14 +122,14 @@ class Changes:
         sources: Sources of the old and the new version.
         changes: The changes. If the formats are equal, the order is: robot name, joints, links.
         effects: One effect for each changed joint or link that moves frames. All other joints and links are
-            unchanged. Some effects cannot be computed and are missing. For example, a new joint has no effect
-            here, nor a joint with another parent link. Empty if the argument `effects` is False.
+            unchanged. Some effects cannot be computed and are missing. Examples are a new joint, and a joint
+            with another parent link. Empty if the argument `effects` is False.
         total: The matching frame that all changes together move farthest. None if no listed change moves a
             matching frame. Also None if the argument `effects` is False.
-        rounding: Proven bounds on the distance (m) and the angle (rad) between matching frames. Given if the
-            verdict of `same` is `UP_TO_SINGLE`: single precision explains every difference in motion.
+        rounding: Proven bounds on the distance (m) and the angle (rad) between matching frames. The bounds
+            exist only for the verdict `UP_TO_SINGLE`: single precision explains every difference in motion.
             `changes` does not list these differences. Infinite without a proof, for example if the argument
-            `effects` is False. None for every other verdict, and if the formats are equal.
+            `effects` is False. None for every other verdict of `same`, and for equal formats.
     """
 
     sources: tuple[str, str]

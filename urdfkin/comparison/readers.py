@@ -98,9 +98,9 @@ def compare_readers(
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, or no installed library reads the file's format. The robot has
-            a locked joint, or was loaded from MJCF text instead of a file. The robot is from a USD file with
-            a selected variant or articulation.
+        InputError: a library is not installed, or no installed library reads the file's format. Also if the
+            robot has a locked joint, or is from MJCF text instead of a file. Also for a USD file with a
+            selected variant or articulation.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)

@@ -328,7 +328,7 @@ class Sameness(Displayable):
             changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips. The last entries are joints of only
-            one model, and links after different moving joints in A and B.
+            one model, and links after different moving joints.
         remarks: Differences without effect on motion. Examples are joint limits, joint types, and links of
             only one model.
         joints: Pairs of matching joints of A and B.
@@ -340,11 +340,11 @@ class Sameness(Displayable):
             coincide.
         base_links: A link of A and a link of B, on matching rigid bodies. The comparison uses poses relative
             to these two links.
-        rounding: (m, rad) largest distance and angle between matching frames that rounding errors can cause.
-        unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
-            distances assume that these joints travel at most 10 m.
-        single: (m, rad) largest distance and angle between matching frames that single precision can cause.
-            None if no file has single precision.
+        rounding: (m, rad) bounds on distance and angle between matching frames, due to rounding errors.
+        unlimited: Planar and floating joints of A, and prismatic joints without limits. Bounds on distances
+            assume that these joints travel at most 10 m.
+        single: (m, rad) bounds on distance and angle between matching frames, due to single precision. None
+            if no file has single precision.
         unexplained: For joints and links of the unchanged models: differences that rounding does not explain.
             The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`. Empty if
@@ -352,10 +352,10 @@ class Sameness(Displayable):
         as_written: Interval of the matching frames that are farthest apart in the unchanged models. None if
             `after` is empty, if no frames can be compared, or if `bounds` is False.
         bound_as_written: (m, rad) proven bounds on distance and angle between matching frames of the
-            unchanged models. Infinite without a proof. If A or B is a Denavit-Hartenberg table and `after` is
-            not empty, only frames with equal names are compared.
-        narrowed: One line for each mimicked joint that can move a mimic joint beyond the limits. The
-            distances in `frames` include the whole range of the mimicked joint.
+            unchanged models. Infinite without a proof. For a Denavit-Hartenberg table, only frames with equal
+            names are compared if `after` is not empty.
+        narrowed: One line for each mimicked joint that can move a mimic joint beyond limits. The distances in
+            `frames` include the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
 
@@ -474,11 +474,11 @@ class Sameness(Displayable):
         )
 
     def within(self, most: float) -> bool:
-        """Return whether all matching frames are proven to differ by at most `most` (m and rad).
+        """Return whether all matching frames provably differ by at most `most` (m and rad).
 
         The unchanged models are compared at equal coordinates. Different base poses, tool frames and joint
-        zeros can therefore increase the distance. If a root body has a link with the name of the other
-        model's root, this link and this root coincide. Otherwise, the two roots coincide. Differences outside
+        zeros can therefore increase the distance. The roots coincide, unless a root body has a link with the
+        name of the other root. Then this link and the other root coincide. Differences outside
         `BOUNDED_DIFFERENCE_KINDS`, such as "only in A", give False.
 
         >>> import urdfkin
@@ -519,8 +519,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
-        Let the models be equivalent. The link poses of A at q and of B at the result then differ only by
-        `base` and `tools`. Coordinates that only B has are neutral.
+        Let the models be equivalent. At q (A) and at the result (B), the link poses differ only by `base` and
+        `tools`. Coordinates that only B has are neutral.
 
         Raises:
             InputError: q does not have A's length, or is not finite.

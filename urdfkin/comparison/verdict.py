@@ -104,18 +104,19 @@ def same(
             most of the time.
         boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
             bounds if the models differ in many places. The value 0 turns off branch and bound.
-        within: Limit (m and rad) for `Sameness.within`. Branch and bound tries to prove this limit for all
-            matching frames, if `Sameness.after` is not empty.
+        within: Limit (m and rad) for `Sameness.within`. If `Sameness.after` is not empty, branch and bound
+            tries to prove this limit.
 
     Returns:
         The verdict, the matched joints and links, and the differences. Each pair of matched links has an
-        interval that contains the largest distance of these links within the joint limits.
+        interval. The interval contains the largest distance of these links within the joint limits.
 
     Raises:
         UrdfError: a model has errors.
         SourceError, UnknownNameError, InputError: as for `load`.
         UnknownNameError: `map` names a joint that the model does not have.
-        InputError: joints in `map` cannot be matched, an argument is wrong, or a path is longer than 1e150 m.
+        InputError: joints in `map` cannot be matched, or an argument is wrong. Also if a path is longer than
+            1e150 m.
         UrdfkinError: Pinocchio finds a distance above a proven bound.
 
     Example:
@@ -724,7 +725,7 @@ class JointComparison:
     """Prove joint by joint that single precision causes every difference.
 
     The rounding errors of all joints add up in a frame's pose. A comparison of frame poses can therefore miss
-    a small wrong number. `JointComparison` allows each joint only the rounding errors of its own numbers.
+    a small wrong number. `JointComparison` allows each joint only its own rounding errors.
 
     **Compared quantities.** Two files can describe the same joint by different frames. The files can also
     have different fixed links. The compared quantities depend on neither:
