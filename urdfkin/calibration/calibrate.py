@@ -2,8 +2,8 @@
 
 Implausible fits (`plausible.py`) are refused. Without `write_all`, a joint parameter must change by more than
 two standard deviations. Otherwise, the parameter gets its original value. The other joint parameters are
-fitted again. This fit includes all identifiable parameters of base and tool. The file then gets the
-parameters that it can store.
+fitted again. This fit includes all identifiable parameters of base and tool. Parameters that the file can
+store are then written.
 
 `read_poses` reads measured poses:
 
@@ -84,9 +84,7 @@ _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 _ROUNDING_FACTOR = 4.0
 #: Maximum number of parameters or poses named in a warning.
 _MAX_NAMES = 6
-_UNKNOWN_REASON = (
-    "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
-)
+_UNKNOWN_REASON = "the reason is unknown; it is not degrees, shifted rows of q or reversed joint signs"
 
 
 @dataclass(frozen=True, eq=False)
@@ -710,8 +708,7 @@ def _read_npz_poses(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
     if ("T" in data) == ("p" in data) or ("quat" in data and "p" not in data):
         found = ", ".join(data)
         raise InputError(
-            "a file of measured poses must contain the arrays `q` and `T`, `q` and `p`, or `q`, `p` and"
-            " `quat`",
+            "a file of measured poses must contain the arrays (q, T), (q, p) or (q, p, quat)",
             where=str(path),
             found=found,
         )

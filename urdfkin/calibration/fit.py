@@ -374,7 +374,7 @@ def fit_parameters(
 
 
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
-    """Estimate the noise, at least as the rounding error.
+    """Estimate the noise; the minimum is the rounding error.
 
     The estimate is a divisor and must not be 0.
     """

@@ -156,8 +156,7 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> U
             "no choice of joint origins makes the robot move like the calibrated arm",
             where=f"{robot.name}, {base} to {tip}",
             found=f"a residual of {residual:.3g} m or rad",
-            remedy="compare the URDF with that of an uncalibrated arm of this type: urdfkin same A.urdf"
-            " B.urdf",
+            remedy="compare with the URDF of an uncalibrated arm of this type: urdfkin same A.urdf B.urdf",
         )
     return found.updated_urdf
 

@@ -134,7 +134,7 @@ class UpdatedURDF:
 
     @cached_property
     def displacements(self) -> dict[str, tuple[float, float]]:
-        """{joint name: displacement of the origin as (distance in m, angle in rad)}."""
+        """{joint name: (distance in m, angle in rad)} between old and new origin."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {

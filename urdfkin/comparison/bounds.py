@@ -5,9 +5,9 @@ varies one coordinate at a time. The largest distance found is the lower bound.
 
 **Upper bound.** The models differ in several places. `urdfkin.model.mechanisms.upper_bound` adds up the
 largest effect of each difference. Each effect can be largest in another configuration. The sum of the effects
-can therefore be far above the largest distance. `tighten` finds a smaller bound by branch and bound.
-`tighten` divides the ranges of the variables into boxes. In each box, a Taylor polynomial and its remainder
-bound the distance.
+can therefore be far above the largest distance. `tighten` computes a bound below this sum by branch and
+bound. `tighten` divides the ranges of the variables into boxes. In each box, a Taylor polynomial and its
+remainder bound the distance.
 
     D(q) = p_B - p_A              difference of the frame's positions in B and A
     D_i                           derivative of D with respect to variable i

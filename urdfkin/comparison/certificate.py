@@ -278,9 +278,9 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    `recheck` matches the joints as in the certificate. If the verdict is "differs", `recheck` compares the
-    models again. This second comparison matches the joints as `same` does without the argument `map`. The
-    second verdict must also be "differs".
+    The joints are matched as in the certificate. If the verdict is "differs", `recheck` compares the models
+    again. The second comparison matches the joints like `same` without the argument `map`. The second verdict
+    must also be "differs".
 
     Returns:
         A line for each statement that is wrong or not proven.

@@ -82,7 +82,10 @@ class ModelChange:
 
 
 def format_value(value: Value | None) -> str:
-    """Return a value as text; a number can be read back exactly."""
+    """Return a value as text.
+
+    The text of a number gives exactly this number again.
+    """
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
@@ -96,7 +99,7 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Effect of one changed joint or link, while all others are unchanged.
+    """Effect of one changed joint or link. The other joints and links are unchanged.
 
     Attributes:
         element: The changed element, for example "joint elbow".
@@ -305,7 +308,10 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Map names such as "origin x" to attributes, including a joint's default values."""
+    """Return {name: attribute}, with a joint's default values.
+
+    A name is, for example, "origin x".
+    """
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":

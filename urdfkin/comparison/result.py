@@ -124,7 +124,8 @@ class Difference:
     """One difference between two models.
 
     Attributes:
-        place: The joint or link, for example "joint elbow". The name is A's, unless only B has it.
+        place: The joint or link, for example "joint elbow". The name is from A, or from B if A has no such
+            joint or link.
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         a: The parameter's value in A; None if A has no value.
         b: The parameter's value in B; None if B has no value.
@@ -557,8 +558,8 @@ class Sameness(Displayable):
         The link poses at q and at the converted q then differ only by `base` and `tools`.
 
         Raises:
-            InputError: a coordinate has no match in the other model. Also if the frames of a planar or
-                floating joint differ.
+            InputError: a coordinate of A or B has no match. Also if the frames of a planar or floating joint
+                differ.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")

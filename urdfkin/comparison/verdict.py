@@ -920,7 +920,7 @@ class JointComparison:
     def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
         """Return the angle (rad) and the distance (m) between two axes.
 
-        The distance is that of one axis's origin from the other axis.
+        The distance is from the origin of one axis to the other axis.
         """
         ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]

@@ -196,7 +196,7 @@ def _compute_interpreted(
         row[:] = result
         least_seconds = min(least_seconds, seconds := time.thread_time() - start_time)
         preload.add_time(name, seconds)
-        # One time gives no estimate: the first configuration takes longer.
+        # The first configuration takes longer, so wait for the second.
         if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least_seconds) is not None:
             return None
     return invalid

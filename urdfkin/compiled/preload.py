@@ -95,8 +95,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single_evaluator(name: str) -> bool:
     """Return whether to use the kernel `one_configuration`.
 
-    If the kernel saves time, this function loads it. Without a selected mode, the result is False before a
-    batch kernel of `name` is loaded.
+    A kernel that saves time is loaded. Without a selected mode, the result is False before a batch kernel of
+    `name` is loaded.
     """
     if _modes:
         return _modes[-1] == "compiled"

@@ -87,7 +87,7 @@ class RequestFilter:
     """Accepts or refuses requests.
 
     Attributes:
-        host: The address that the server listens on, as given by the user.
+        host: The address from the user, at which the server listens.
         key: The key, which must be the whole path of every request.
     """
 

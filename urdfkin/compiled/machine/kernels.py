@@ -1,7 +1,7 @@
 """The compiled recursions, one for each function of the module `recursions`.
 
 A kernel computes eight configurations at a time. Each lane of a vector register contains one configuration. A
-single configuration fills all eight lanes. Its result is exactly the same as in a batch.
+single configuration fills all eight lanes. The result is exactly the same as in a batch.
 """
 
 from __future__ import annotations

@@ -162,7 +162,7 @@ def one_configuration(bound, arguments, count):
 
 @inline
 def _compute_into(address, inputs, to, ndarray):
-    """Write the result to `to`, and return whether it is valid."""
+    """Write the result to `to`, and return True for a valid result."""
     args = integers_at(address)
     orders, rows, columns, width = args[_ORDERS], args[_ROWS], args[_COLUMNS], args[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, args[_AXES], rows, columns)
