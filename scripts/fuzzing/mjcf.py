@@ -14,6 +14,7 @@ import numpy as np
 
 from scripts.fuzzing import Case
 from scripts.fuzzing.robots import draw_direction, usual_length
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import JointKind, LinkFrame
 from urdfkin.robot import Robot
 
@@ -179,6 +180,10 @@ def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | Non
                 )
         mujoco.mj_fwdPosition(model, data)
         large = 10.0 + float(np.abs(data.qpos).max(initial=0.0)) + float(np.abs(model.qpos0).max(initial=0.0))
+        # A hinge angle has a rounding error of about EPS * angle. The lever arm multiplies this error.
+        sizes = np.abs(data.qpos) + np.abs(model.qpos0)
+        angle = float(sizes[model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]].sum())
+        tolerance = _TOLERANCE * large + EPS * angle * (10.0 + float(sizes.sum()))
         for kind, count in (("body", model.nbody), ("site", model.nsite)):
             for i in range(1 if kind == "body" else 0, count):
                 mj_object = getattr(data, kind)(i)
@@ -186,7 +191,7 @@ def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | Non
                 error = max(
                     np.abs(T[:3, 3] - mj_object.xpos).max(), np.abs(T[:3, :3].ravel() - mj_object.xmat).max()
                 )
-                if error > _TOLERANCE * large:
+                if error > tolerance:
                     return f"{mj_object.name} is off by {error:.3g}"
         for row in np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)):
             i = int(data.efc_id[row])

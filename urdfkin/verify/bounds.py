@@ -583,7 +583,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     (near, near_mixed), (far, far_mixed) = _CROSS_PRODUCT_COUNTS[reference]
     step, v_index = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
-    is_rotation, multipliers = plan.columns[:, ColumnField.IS_ROTATION] == 1, np.abs(plan.multipliers)
+    # A subnormal multiplier has a large relative error. Therefore, its scale is `SMALLEST_NORMAL`.
+    is_rotation, multipliers = plan.columns[:, ColumnField.IS_ROTATION] == 1, magnitude(plan.multipliers)
     for f, (_, frame) in enumerate(plan.frames):
         columns = np.flatnonzero(plan.target_columns[f] >= 0)
         i, j = columns[:, np.newaxis], columns[np.newaxis, :]
@@ -681,7 +682,7 @@ def singularity_margin(plan: CompiledTree) -> float:
 
 
 def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Sum |multiplier| over the joints of a path that share a joint velocity.
+    """Sum `magnitude(multiplier)` over the joints of a path that share a joint velocity.
 
     For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
@@ -690,11 +691,11 @@ def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
-        weights = np.zeros((2, len(plan.frames), plan.nv))
+        weights, multipliers = np.zeros((2, len(plan.frames), plan.nv)), magnitude(plan.multipliers)
         for f, (_, frame) in enumerate(plan.frames):
             for c in np.flatnonzero(plan.target_columns[f] >= 0):
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
-                weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
+                weights[kind, frame, plan.columns[c, ColumnField.V]] += multipliers[c]
         weights.setflags(write=False)
         # The array is stored only when it is complete, because other threads may read the cache.
         plan.cache["column weights"] = weights
