@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # Import urdfkin and `scripts` from this checkout.
-# Without this setting, idle threads of PyTorch make other libraries slower.
+# Otherwise, idle threads of PyTorch make other libraries slower.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from scripts.benchmarking import sections as measured
@@ -43,7 +43,7 @@ class BenchmarkSize:
     rounds: int = 21
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # approximate number of elements of a batch's Jacobians (section `joints`)
+    numbers: int = 4_000_000  # approximate number of Jacobian elements per batch (`joints`)
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames in one pass
     frame_configurations: int = 4_000  # configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches

@@ -49,7 +49,8 @@ SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
 #: Number of timed launches per measurement.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
-#: Maximum allowed error of PyTorch Kinematics, which reads the angles of a URDF in single precision.
+#: Maximum allowed error of PyTorch Kinematics.
+#: PyTorch Kinematics reads a URDF's angles in single precision.
 _MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"

@@ -53,8 +53,9 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
     except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
-    # git separates the numbers of added and deleted lines and the path with TAB, and ends an entry with NUL.
-    # The entry of a moved file contains NUL, the old path, NUL and the new path instead of the path.
+    # ADDED and DELETED are numbers of lines.
+    # Entry: ADDED TAB DELETED TAB PATH NUL
+    # Moved file: ADDED TAB DELETED TAB NUL OLD_PATH NUL NEW_PATH NUL
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))

@@ -44,9 +44,9 @@ from urdfkin.verify.verifier import compute_bound
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch. None means urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Maximum numbers of stored configurations and frames for each robot.
+#: Maximum numbers of stored configurations and frames per robot.
 STORED, STORED_FRAMES = 9, 6
-#: Index of the configuration that is computed in plain Python and by kernels.
+#: Index of the configuration that Python and kernels compute.
 INTERPRETED_INDEX = 3
 MODES: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
@@ -166,7 +166,7 @@ def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # 0 and -0 differ in bits, but not in value.
+    # 0 and -0 are equal, but their bits differ.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

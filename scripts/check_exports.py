@@ -51,8 +51,9 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: For robots with more joint velocities, the slow check of the Hessian is skipped for `torch` and `jax`.
-#: For JAX, the format `array` is always checked without Hessian, because JAX would compile it for minutes.
+#: Maximum nv for Hessians in the formats `torch` and `jax`.
+#: With JAX, the format `array` is checked without a Hessian.
+#: JAX would compile this Hessian for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 

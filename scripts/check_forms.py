@@ -44,7 +44,8 @@ from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
-#: Limits for the format `matlab-symbolic`, because Octave's symbolic package takes 20 s for six joints.
+#: Limits for `matlab-symbolic`: number of tables, rows of a table.
+#: For six joints, Octave's symbolic package takes 20 s.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the Octave program, for each format.
@@ -76,7 +77,9 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: A function that runs the code of jobs and returns the poses of each job. It may write into the folder.
+#: A function that runs the code of all jobs.
+#: The result contains the poses of each job.
+#: The function may write into the folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -135,7 +138,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package `symbolic` also prints a version of Python, which `re.sub` removes.
+    # `re.sub` removes the Python version that `symbolic` prints.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -152,7 +155,7 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        with warnings.catch_warnings():  # hide warnings about the robot's limits and axes
+        with warnings.catch_warnings():  # hide warnings about limits and axes
             warnings.simplefilter("ignore", urdfkin.UrdfWarning)
             path = urdfkin.load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]
@@ -214,7 +217,8 @@ class Case:
             Largest difference from urdfkin's pose, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Even if all lengths are zero, sine and cosine have rounding errors, so `allowed` must not be zero.
+        # `rounding` is 0 for a table without lengths.
+        # Sine and cosine still have rounding errors.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

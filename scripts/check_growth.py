@@ -77,7 +77,7 @@ KINDS: dict[str, Kind] = {
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
     "bad numbers": _robot_with_many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
-    # Documents with many or long comments that suppress findings (`urdfkin: ignore`).
+    # Inputs with many or long comments `urdfkin: ignore`.
     "comments that suppress no finding": _robot_with_many("<!-- urdfkin: ignore[x{i}] y -->\n"),
     "consecutive comments": _robot_with_many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),

@@ -37,7 +37,8 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of each element of a placement: a coordinate (m) or an entry of the rotation.
+#: Maximum rounding error of an element of a placement.
+#: An element is a coordinate (m) or a rotation entry.
 ROUNDING = 1e-10
 
 
@@ -52,7 +53,8 @@ def check_pair(name: str, change: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": change, "verdict": comparison.verdict.value, "seconds": seconds}
     if change in ALIKE:
         return result | {"right": bool(comparison) and moves_alike(comparison, a, b, ROUNDING)}
-    # For `rounded`, every verdict is accepted, because rounding leaves some files unchanged.
+    # The change `rounded` leaves some files unchanged.
+    # All verdicts about `rounded` are therefore accepted.
     result["right"] = comparison.verdict is Verdict.DIFFERS or change == "rounded"
     tools = {tool.b for tool in comparison.tools}
     frames = [frame for frame in comparison.frames if frame.frame_b not in tools and frame.q_a]

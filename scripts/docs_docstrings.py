@@ -14,9 +14,9 @@ import griffe
 
 from urdfkin.robot import Robot
 
-#: Regular expression for the heading `Example:` of a docstring and the indented lines below.
+#: Matches a heading `Example:` and the indented lines below.
 _EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
-#: Regular expression for a Python prompt `>>>` and all lines up to the next blank line.
+#: Matches a prompt `>>>` and the following nonblank lines.
 _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 

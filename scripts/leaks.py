@@ -48,7 +48,8 @@ def measure_usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    # `use_only` loads each kernel at its first use. A later load of a kernel would look like a leak.
+    # Later loads of kernels would look like a leak.
+    # `use_only` loads each kernel at its first use.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

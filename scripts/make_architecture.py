@@ -22,7 +22,7 @@ ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
 PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
-#: Maps a foreign library to the module or the packages that may import the library.
+#: Maps a foreign library to its allowed importing modules.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
@@ -85,7 +85,8 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # An imported name is a module (`urdfkin.robot.loading`) or is defined in one (`urdfkin.robot.Robot`).
+        # `urdfkin.robot.loading` is a module.
+        # `urdfkin.robot.Robot` is a name in the module `urdfkin.robot`.
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()

@@ -93,7 +93,8 @@ def photograph_viewer(folder: Path) -> None:
                     browser.wait("return document.getElementById('fold') !== null")
                     browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
-                # Each animation frame takes seconds, so the script stops the animation before the screenshot.
+                # An animation frame takes seconds.
+                # Without this line, the animation would delay the screenshot.
                 browser.js("window.requestAnimationFrame = () => 0")
                 time.sleep(2)
                 save_screenshot(browser, f"{name}{theme}")

@@ -48,9 +48,9 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    reads: str  # The tool that writes the input file; empty if the URDF is the input file.
-    program: str  # Python code that converts the file `source`.
-    writes: str = ""  # End of the output file's path; empty if the program prints the path.
+    reads: str  # the tool that writes the input; empty: the URDF
+    program: str  # Python code that converts `source`
+    writes: str = ""  # the output's suffix; empty: the program prints the path
 
 
 TOOLS = {
@@ -89,7 +89,8 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short forms of verdicts. The first key with which a verdict begins determines its short form.
+#: Maps the beginning of a verdict to a short form.
+#: The first matching key applies.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -97,7 +98,8 @@ _SHORT = {
     "not compared": "not readable",
 }
 _QUOTED = 120
-#: Settings with which MuJoCo accepts bodies without mass or with impossible inertia.
+#: With these settings, MuJoCo accepts missing masses.
+#: MuJoCo also accepts impossible inertias.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
 
 

@@ -127,7 +127,8 @@ def _generate_code(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # Replace doubles by SIMD vectors, and remove CasADi's tests for missing arguments.
+    # Replace doubles by SIMD vectors.
+    # Remove CasADi's tests for missing arguments.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

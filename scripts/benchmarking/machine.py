@@ -21,9 +21,12 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the time (ms) for a first result, with an empty kernel cache and with stored kernels.
+#: Keys of the times (ms) for a first result.
+#: The kernel cache is empty, or contains the kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` that compile a kernel at their first call, with the number of inputs q, v and a.
+#: Maps a method of `Robot` to its number of inputs.
+#: The first call of the method compiles a kernel.
+#: Inputs: 1: q. 2: q, v. 3: q, v, a.
 USES = {
     "placement": 1,
     "velocity": 2,

@@ -15,7 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
-#: Most joints of the humanoid talos do not move `gripper_left_base_link`.
+#: Most joints of talos do not move `gripper_left_base_link`.
 ROBOT_FRAMES = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls.
 LOOP = 2_000

@@ -24,8 +24,10 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Commands below each heading of the help page. Each command has a module in `urdfkin.cli` and a summary.
-#: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
+#: Maps a heading of the help page to its commands.
+#: Maps a command to a module and a summary.
+#: The function `NAME_command` of the module is the command.
+#: `make_command` makes the commands of quantities.
 _COMPUTE_HEADING = "Compute"
 _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -217,7 +219,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version
 
     click.echo(f"urdfkin {urdfkin_version()}, Pinocchio {version()}")
-    # If Pinocchio is not installed, this call raises an error.
+    # Without Pinocchio, this call raises an error.
     pinocchio()
     ctx.exit()
 
@@ -251,6 +253,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The warning "not verified" is hidden, because the last line of the output repeats it.
+    # The last line of the output already contains "not verified".
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

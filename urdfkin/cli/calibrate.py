@@ -148,7 +148,8 @@ def calibrate_command(
 
     def write_answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # JSON is returned as text, because `Answer` adds the keys `verified` and `check` to a mapping.
+        # `Answer` adds the keys `verified` and `check` to a mapping.
+        # `Answer` does not change a text.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMATS)
         context.exit(code)
 
@@ -207,7 +208,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     table = read_table_or_screws(options["robot"]) if is_table_file(options["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
     if source is not robot:
-        # The fit uses the table itself, not the robot that is made of the table.
+        # The fit uses the table, so robot options are rejected.
         unused = "mimic", "root_joint", "lock", "joints", "convention"
         reject_unused_options(context, unused, "for a table")
     path = robot.chain(tip, base)
@@ -216,7 +217,8 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     coordinates, neutral = (robot.coordinate_names, robot.neutral()) if source is robot else (names, None)
     if conversion is not None:
         coordinates, neutral = conversion.coordinate_names, conversion.to(robot.neutral())
-        # In some conventions, a mimic joint has a coordinate, which must agree with the mimicked joint's.
+        # Some conventions have a coordinate for each mimic joint.
+        # This coordinate must follow the mimicked joint.
         mimics = [j.name for j in robot.tree.joints if j.mimic and j.mimic.mimicked_joint in names]
         indices = conversion.q_and_v_indices
         names = [coordinates[i] for name in (*names, *mimics) if name in indices for i in indices[name][0]]
@@ -229,7 +231,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        # These warnings were shown when the robot was loaded.
+        # `load` has already shown these warnings.
         warnings.simplefilter("ignore")
         return fit_model(
             source,

@@ -28,9 +28,11 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Minimum time (s) between two progress lines of text, and between two progress lines of JSON.
-#: The last line of JSON is printed at once.
-_LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
+#: Minimum time between two progress lines of text, in seconds.
+_LINE_INTERVAL = 10.0
+#: Minimum time between two progress lines of JSON, in seconds.
+#: The JSON line of the last state is always printed.
+_JSON_INTERVAL = 0.5
 
 
 class SpeedEstimator:
@@ -44,7 +46,8 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # Each call before the first new chunk restarts the clock, because urdfkin may compile kernels first.
+        # The measured time excludes the compilation of kernels.
+        # Each call before the first new chunk restarts the clock.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:
@@ -153,7 +156,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
 
 _MAX_FAILED = 20
-#: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
+#: Maximum number of chunks that `_seconds_per_chunk` reads.
 _MAX_TIMED_CHUNKS = 200
 
 
@@ -236,7 +239,7 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
     seconds = []
     for robot in begun[:: max(1, len(begun) // _MAX_TIMED_CHUNKS)][:_MAX_TIMED_CHUNKS]:
         answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
-        # A damaged file is counted in `counts`, but has no result.
+        # `counts` includes damaged files, which contain no result.
         if (one := next((x.seconds for x in answers if isinstance(x, ChunkResult)), None)) is not None:
             seconds.append(one)
     return sum(seconds) / len(seconds) if seconds else None

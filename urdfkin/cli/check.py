@@ -170,7 +170,7 @@ def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS_KEY = "urdfkin.settings"
-#: Settings in pyproject.toml that replace the defaults of options
+#: Settings in pyproject.toml that replace defaults.
 _OPTION_SETTINGS = ("select", "ignore", "exclude", "strict", "notes")
 
 
@@ -429,7 +429,7 @@ class CheckRun:
                 self._checked_files.add(file)
                 self.has_usd = self.has_usd or is_usd(file)
                 try:
-                    # A file that the user named directly may be a pipe.
+                    # Only files on the command line may be pipes.
                     if file not in (word, f"./{word}"):
                         require_regular_file(Path(file))
                     self._check(str(resolve_package_uri(file)))
@@ -515,7 +515,7 @@ class CheckRun:
             self.outcome.fixable_count += len(result.fixed_findings)
             self.outcome.patches.append(make_patch(file, text.data, result.text.data, escape_for_terminal))
             chosen, findings = make_predicate(), self.examine_text(result.text).findings
-            # --fix does not change a file with an error.
+            # `--fix` does not change a file with an error.
             if not any(finding.severity is Severity.ERROR for finding in findings):
                 self.outcome.unsafe_count += sum(
                     chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.allows_unsafe_fixes
@@ -549,7 +549,7 @@ def _find_writable_path(text: UrdfText) -> Path | None:
     return None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
 
 
-#: Suffixes of MJCF files and of files that an MJCF file includes
+#: Suffixes of MJCF files and included MJCF files.
 _MJCF = (".xml", ".mjcf")
 
 
@@ -560,7 +560,7 @@ def _is_usd_or_mjcf(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            # This return avoids the import below, which loads NumPy.
+            # This return avoids the import of NumPy below.
             return False
     from urdfkin.urdf.mjcf import is_mjcf
 

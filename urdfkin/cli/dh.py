@@ -24,8 +24,8 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import Answer, answer_command, report_compilation
 from urdfkin.cli.shell import complete_table
 
-#: The formats urdf and svg, and a copy of `urdfkin.dh.export.FORMATS`.
-#: An import of that module would slow --help down.
+#: Copy of `urdfkin.dh.export.FORMATS`, plus `urdf` and `svg`.
+#: An import of `urdfkin.dh.export` would slow `--help` down.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
@@ -158,11 +158,11 @@ form_options = combine(
 )
 
 
-#: Options that cannot be combined with --like.
-#: With --like, a published table determines the values of these options.
+#: With `--like`, a published table determines these options.
 _OPTIONS_FIXED_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 _DERIVATION_OPTIONS = ("convention", "near_parallel", "snap", "slide", "like", *_OPTIONS_FIXED_BY_LIKE)
-#: If ROBOT is a Denavit-Hartenberg table, only these options make the command derive a new table.
+#: Options that require a new derivation of a table.
+#: Without these options, a table as ROBOT stays unchanged.
 _NEW_TABLE_OPTIONS = ("base", "tip", "all_", "lock", "joints", *_DERIVATION_OPTIONS[1:])
 _PRINTED_TABLE_OPTIONS = ("degrees", "millimetres", "digits", "columns")
 

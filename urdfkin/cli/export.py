@@ -41,7 +41,7 @@ from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
 
-#: Languages that a file with each suffix may contain. Without --to, the first language is chosen.
+#: Maps a suffix to languages. Without `--to`, the first language applies.
 _LANGUAGES_OF_SUFFIXES = {
     **dict.fromkeys((".c", ".h"), ("c",)),
     **dict.fromkeys((".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx"), ("cpp",)),
@@ -50,13 +50,13 @@ _LANGUAGES_OF_SUFFIXES = {
     ".m": ("matlab",),
     ".tex": ("latex",),
 }
-#: Common names of languages and libraries, each with the name that --to accepts.
+#: Maps a common name to the name that `--to` accepts.
 _LANGUAGE_SYNONYMS = {
     "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
 }  # fmt: skip
 
 
-class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
+class _Language(click.Choice):  # type: ignore[type-arg]  # generic only since click 8.2
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if (name := _LANGUAGE_SYNONYMS.get(str(value).lower())) is not None:
             self.fail(f"{value!r} is not the name of a language; did you mean {name}?", param, ctx)

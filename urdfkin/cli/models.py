@@ -37,13 +37,12 @@ if TYPE_CHECKING:
     from urdfkin.comparison.result import SameQuestion
     from urdfkin.robot import Robot
 
-#: Options of `urdfkin same` that need exactly two robots
+#: Options of `urdfkin same` that need exactly two robots.
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck.
-#: --recheck cannot be combined with the other options of this tuple.
+#: `recheck`, and the options that `--recheck` excludes.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
-#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf. `urdfkin diff` rejects revisions.
-#: A file with such a name is accepted.
+#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
+#: `urdfkin diff` accepts a file with such a name.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 

@@ -108,7 +108,7 @@ def reject_unused_options(context: click.Context, unused: Collection[str], becau
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: Number of samples that an option with the value `random` draws, for example `--q random`.
+#: Number of samples for the word `random` without a count.
 _RANDOM_SAMPLES = 1
 
 
@@ -245,7 +245,7 @@ path_options = combine(
 )
 
 
-class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic only since click 8.2
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             return super().convert(value, param, ctx)
@@ -403,7 +403,7 @@ class Inputs:
         return replace(self, settings={**self.settings, **more})
 
 
-#: The family of findings about masses, shapes and colours.
+#: Prefix of the codes about masses, shapes and colours.
 _NON_KINEMATIC_FINDINGS = "URDF7"
 
 

@@ -38,7 +38,8 @@ _SUFFIXES = {
 }  # fmt: skip
 _F = TypeVar("_F", bound=Callable[..., Any])
 #: Maximum number of characters in a line of a table.
-#: Cells are padded to the widest cell of their column, so one very long name could fill the memory.
+#: Each cell is as wide as its column's widest cell.
+#: Without this limit, one long name could fill the memory.
 _MAX_WIDTH = 10_000
 
 
@@ -189,7 +190,7 @@ def check_writable(*paths: Path | None) -> None:
     """
     for path in filter(None, paths):
         try:
-            # `write_file` writes to a device or a pipe directly, without a temporary file.
+            # `write_file` makes no temporary file for devices and pipes.
             if path.exists() and not path.is_file():
                 continue
             target = path.resolve()

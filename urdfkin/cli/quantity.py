@@ -240,7 +240,7 @@ def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.has_columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.velocity_names]
-        # In a Hessian's CSV, each line has the derivatives of one Jacobian entry.
+        # A CSV line contains the derivatives of one Jacobian entry.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.ndim):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -257,7 +257,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first column of CSV output, for samples without and with times.
+#: Headings of the first CSV column, without and with times.
 _SAMPLE_HEADINGS = ("sample", "t")
 
 
@@ -272,7 +272,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    # A table with columns x, y and z needs three numbers in each row.
+    # A row x, y, z has three numbers.
     # A pose with a quaternion has seven numbers.
     if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
@@ -427,7 +427,7 @@ def _replay_command(x: Inputs, k: int, form: str) -> str:
 
 
 #: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES` in small letters.
-#: The import of that module would slow --help down.
+#: An import of that module would slow `--help` down.
 _EULER_SEQUENCES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = (
     "rpy",

@@ -23,12 +23,14 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Completion offers only these names, because they contain no character that a shell interprets.
-#: The pattern also excludes colons, because Bash separates words at colons.
+#: Names that completion offers.
+#: These names contain no character that a shell interprets.
+#: Bash separates words at colons, so colons are excluded.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a file from which shell completion reads frame names
+#: Maximum size (bytes) of a file for frame names.
 _MAX_BYTES = 10_000_000
-#: XML elements that define frames. In a URDF, only elements directly below <robot> define frames.
+#: XML elements that define frames.
+#: In a URDF, only children of <robot> define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
@@ -42,7 +44,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     # During completion of an option, click has not parsed ROBOT.
-    # Completion therefore uses the first unparsed argument as ROBOT.
+    # ROBOT is then the first unparsed argument.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 

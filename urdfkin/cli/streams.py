@@ -24,7 +24,7 @@ import click
 from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import CI_COMMAND_ANYWHERE, CI_COMMANDS, escape_sequence, escape_unprintable
 
-#: Exit code of shells for a program that writes to a closed pipe
+#: Exit code after a write to a closed pipe.
 BROKEN_PIPE_EXIT_CODE = 128 + signal.SIGPIPE
 
 
@@ -33,7 +33,7 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # DegreesWarning is hidden, because each command itself reports joint values that look like degrees.
+    # Each command itself reports joint values that look like degrees.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -111,10 +111,10 @@ def _show_warning(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: Escape sequences that the package rich writes for colours and for progress bars
+#: Escape sequences for colours and progress bars (package `rich`).
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum number of stored characters of an unfinished line. A longer line is stored only in part.
-#: The stream stores unfinished lines because a CI command may be written in several pieces.
+#: Maximum length of an unfinished line that is stored completely.
+#: Several writes can form one CI command in this line.
 _MAX_STORED = 64
 
 
@@ -133,7 +133,7 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
-        # Control characters and CI commands are escaped only between the escape sequences for colours.
+        # Escape sequences for colours stay unchanged.
         pieces[::2] = [self._escape_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
@@ -180,8 +180,9 @@ class SafeStream:
         escaped_indices = [
             m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
         ]
-        # Only the last 16 characters of a long line are stored.
-        # The "x" replaces the deleted characters, so that a remaining "::" is not at the start of the line.
+        # Of a long line, only the last 16 characters are stored.
+        # The "x" replaces the deleted characters.
+        # Without "x", a stored "::" could begin the line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (
@@ -205,7 +206,7 @@ def wrap_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # If this stream reported the encoding ASCII, click would bypass this stream.
+            # click would bypass a stream that reports the encoding ASCII.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 

@@ -28,7 +28,7 @@ class Terminal(Console):
         if self.is_terminal or only_text:
             super().print(*texts, **{"soft_wrap": only_text} | options)
             return
-        # The package rich pads the lines of a table with blanks.
+        # The package `rich` adds blanks at the end of lines.
         with self.capture() as capture:
             super().print(*texts, **options)
         self.file.write(_TRAILING_BLANKS.sub("", capture.get()))

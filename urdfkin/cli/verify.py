@@ -224,7 +224,7 @@ def _import_file(path: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # The folder is at the end of sys.path, so that its files cannot replace installed modules.
+    # The last folder in `sys.path` hides no installed module.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

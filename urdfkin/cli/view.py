@@ -114,7 +114,7 @@ def view_command(
         Viewer(server, loaded, None if start is None else start[0], motion, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        # Without a flush, a reader of a pipe gets the address late.
+        # A pipe transmits the address only after a flush.
         sys.stdout.flush()
         opens = sys.stdout.isatty() and has_screen() if browser is None else browser
         with open_page(server.address) if opens else nullcontext():
@@ -123,7 +123,8 @@ def view_command(
         server.stop()
 
 
-#: Copy of the names in `urdfkin.view.plot`; the import of that module would slow --help down
+#: Copy of the names in `urdfkin.view.plot`.
+#: An import of `urdfkin.view.plot` would slow `--help` down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -230,7 +231,7 @@ def _make_line(
     from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = find_conversion(robot, convention)
-    # With equal seeds, a random start and a random end would be the same configuration.
+    # Equal seeds would draw the same random start and end.
     other_seed = seed + 1 if start.startswith("random") else seed
     first, last = (
         read_inputs(robot, None, own_seed, text, option=option, conversion=conversion).q

@@ -71,10 +71,11 @@ if TYPE_CHECKING:
     from urdfkin.verify.usd_check import SinglePrecisionErrors, SingleRoundingTerms
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
+#: Gravity in m/s^2, in world axes.
+#: Pinocchio and MuJoCo have the same default value.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations that determine the generic rank of a Jacobian.
+#: Number of random configurations in a rank computation.
 _RANK_SAMPLES = 3
 #: `dir(robot)` omits these internal members.
 _INTERNAL_NAMES = {"plan", "single", "single_terms", "verifier"}
@@ -162,21 +163,24 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Terms of `single` for each joint of a USD stage in single precision; None without a USD stage.
+        #: Maps a joint to its terms of `single`.
+        #: None: the source is not a USD stage in single precision.
         self.single_terms: SingleRoundingTerms | None = None
-        #: USD path of each link's prim (scene object); empty without a USD stage.
+        #: USD path of the prim (scene object) of each link.
+        #: Without a USD stage, the mapping is empty.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        # Pinocchio checks each result of the evaluators in `_checked`, and no result of those in `_prepared`.
+        # Evaluators in `_checked` check every result with Pinocchio.
+        # Evaluators in `_prepared` check no result.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Copies have empty caches and a verifier of their own.
+        # A copy has empty caches and its own verifier.
         empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_checked": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
@@ -542,7 +546,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # The returned lines mention values that are probably in degrees, so a warning is not needed.
+        # The returned lines already mention values that look like degrees.
         q = configuration.parse_finite(self.tree, q, "q", warn=False)
         return configuration.limit_violations(self.tree, q)
 
@@ -699,7 +703,8 @@ class Robot(Displayable):
 
         if joints is not None:
             joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints")]
-        # The URDF text of these sources contains no masses. Only MJCF and USD files have a digest.
+        # Only MJCF and USD files have a digest.
+        # urdfkin writes no masses into the URDF of these sources.
         has_masses = not self.origin.sha256 and self.source not in ("<pinocchio.Model>", "<yourdfpy>")
         return Conversion(self.tree, self.urdf, find_convention(name), joints, has_masses=has_masses)
 
@@ -849,8 +854,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
-        # Subclasses of str may print names differently in error messages.
-        # A plain str avoids the difference.
+        # A subclass of str can print itself differently in messages.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(
             self.tree, self.plan, frame, _ALIGNED, None, (q,), additional_frames=(name,), relative_to=name
@@ -1722,10 +1726,10 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # If `frame` is a plain str and `reference` is the default, `frame` is the key.
-        # This key is fast. The hash of a `Reference` is slow, because `Reference` is an enumeration.
-        # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
-        # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
+        # The hash of a `Reference` is slow.
+        # With the default reference, a plain str is the key.
+        # All other keys are tuples with the class of `frame`.
+        # `LinkFrame("link:a") == "link:a"`, but their frames can differ.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

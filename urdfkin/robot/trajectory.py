@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of one sample in each array, for example `(nq,)` for q.
+#: Shape of one sample for each array: `{"q": (nq,)}`.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -120,11 +120,12 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: Minimum number of samples; a second difference needs three.
+#: Minimum number of samples. A second difference needs three samples.
 _MIN_SAMPLES = 3
-#: Names of the .npz arrays with the root link's pose, velocity and acceleration.
+#: Names of .npz arrays that describe the root link's motion.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Times cause a note if their rounding exceeds this fraction of the smallest step.
+#: Maximum rounding error of times, divided by the smallest step.
+#: Above this limit, the trajectory has a note.
 _TIME_ROUNDING = 1e-6
 
 
@@ -231,8 +232,9 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # For a planar or floating joint, `step` is a constant twist in the moving frame.
-    # Therefore, v and a of all joints are `step` times the time derivatives `s_1` and `s_2` of s.
+    # v = s_1 * step and a = s_2 * step for each joint.
+    # For planar and floating joints, `step` is a twist.
+    # This twist is constant in the moving frame's axes.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -323,7 +325,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
         coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # The error of the acceleration is proportional to h^order, where h is the time step.
+        # The error of a is proportional to (time step)^order.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -489,12 +491,12 @@ def read_columns(
 
 
 _TIMES = ("t", "time", "timestamp")
-#: Number of time units in one second, by the name of the unit.
+#: Maps a time unit's name to units per second.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: Patterns of column names that end with a unit: `v:elbow_deg_s`, `a:elbow_rad_per_s2`, `elbow_deg`.
+#: Patterns such as `v:elbow_deg_s`, `a:elbow_rad_per_s2` or `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -555,7 +557,7 @@ def _parse_unit(text: str, where: str, expected: str) -> str:
 
 def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
-        # For k * 15 degrees, `radians_from_degrees` returns the double k * math.pi / 12.
+        # Exactly: radians_from_degrees(15.0 * k) == k * math.pi / 12.
         return np.fromiter(map(radians_from_degrees, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
@@ -624,16 +626,17 @@ def _check_columns(
         )
 
 
-#: If a joint's samples span more than this angle (rad), the samples stay unchanged.
-#: The margin of 0.02 covers angles that are rounded to two decimals.
+#: Largest span (rad) of the samples that urdfkin unwraps.
+#: Angles in a file may be rounded to two decimals.
+#: The margin of 0.02 covers the rounding of two angles.
 _ONE_TURN = math.tau + 0.02
-#: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.
-#: For example, rotations by 130 and by -230 degrees lead to the same pose.
-#: At 120 degrees, the rotation in the other direction is twice as large.
+#: Largest rotation (rad) between samples with a clear direction.
+#: Rotations by 120 and -240 degrees give the same pose.
+#: urdfkin assumes the rotation by 120 degrees, which is shorter.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
-#: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error.
-#: For a multiplier m with |m| > 1, the limit is |m| times this value.
+#: Maximum rounding error (rad, m) of a mimic joint's value.
+#: A multiplier |m| > 1 multiplies this limit by |m|.
 _MIMIC_ROUNDING = 1e-9
 
 
