@@ -1,6 +1,6 @@
-"""Command-line interface; the module of a command is imported only when the command runs.
+"""Command-line interface. Only a running command imports its module.
 
-The summaries of commands are in this module or in `verify/quantities.py`. Therefore, `urdfkin --help` needs
+The summaries of commands are in this module or in `verify/quantities.py`. `urdfkin --help` therefore needs
 neither NumPy nor Pinocchio.
 """
 
@@ -52,7 +52,7 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
         "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare a published table with a robot."),
         "screws": (
             "paths",
-            "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",
+            "Compute a path's product of exponentials: pose at q = 0, and joint screws.",
         ),
         "chain": ("paths", "Show the joint axes on the path between two frames."),
         "structure": ("paths", "Classify the arm along a path: wrist, parallel axes, closed-form solvers."),
@@ -171,7 +171,7 @@ def _unknown_command(name: str) -> UrdfkinError:
 
 
 class LazyGroup(click.Group):
-    """A command group that imports the module of a command only when the command is used."""
+    """A command group that imports a command's module only when the command runs."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(commands())
@@ -239,8 +239,8 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
-    shows the options of a command, and an example.
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. `urdfkin COMMAND --help` shows the
+    options of a command, and an example.
     """
 
 

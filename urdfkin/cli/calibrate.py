@@ -109,18 +109,19 @@ def calibrate_command(
     output: Path | None,
     **_: Any,
 ) -> None:
-    """Fit the parameters of ROBOT to measured poses, and write the calibrated robot to a new file.
+    """Fit the parameters of ROBOT to measured poses, and write a calibrated file.
 
     The new URDF differs from that of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at the
-    measured configurations. With --ur, Pinocchio uses random configurations. If ROBOT is the file of a
-    Denavit-Hartenberg table, the command fits the numbers of the table. Pinocchio checks the new table in the
-    zero configuration. If neither --poses nor --ur is given, the command lists which parameters are
-    identifiable in principle.
+    measured configurations. With --ur, Pinocchio uses random configurations.
 
-    The command refuses a calibration that is not plausible, and prints the likeliest cause. Possible causes
-    are joint angles in degrees, a joint with the wrong sign, or joint values that belong to another pose.
-    With --force, the command writes the calibration nevertheless. If the joint values look like degrees,
-    --radians is also needed.
+    If ROBOT is a Denavit-Hartenberg table, the command fits the table's numbers. Pinocchio checks the new
+    table in the zero configuration.
+
+    Without --poses and --ur, the command lists the parameters that are identifiable in principle.
+
+    The command refuses an implausible calibration, and prints the likeliest cause. Possible causes are angles
+    in degrees, a joint's wrong sign, or another pose's joint values. With --force, the command writes the
+    calibration nevertheless. If the joint values look like degrees, --radians is also needed.
 
     Exit 0: verified, or only a list of parameters. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or
     refused.
@@ -270,7 +271,7 @@ def _factory_calibration(robot: Robot, path: Path, order: str) -> UpdatedURDF:
         *(read_calibrated_origins(path, one) for one in ROTATION_ORDERS)
     )
     say(
-        f"using --order {order}; with the other value of --order, the pose of the tool differs by up to"
+        f"using --order {order}; the other --order changes the tool's pose by up to"
         f" {length(metres)} and {angle(radians)} (docs/calibration.md)",
         err=True,
     )

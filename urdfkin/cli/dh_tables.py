@@ -68,8 +68,8 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `unchanged_table` is the path of a table or screws if no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is
-    given, else None. `dh_arguments` are arguments of `Robot.dh`.
+    `unchanged_table` is the path of a table or of screws. None: the input is another file, or an option in
+    `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given. `dh_arguments` are arguments of `Robot.dh`.
     """
 
     robot: Robot
@@ -171,7 +171,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
 
 
 def _with_link_frames(request: DHRequest, table: DHTable) -> DHTable:
-    """In the robot made from a table, a joint can have the name of the table's base or tip."""
+    """Name the base and tip as links, because a joint can have the same name."""
     links = link_names(table)
     # A table from screws already has names such as "link:tip".
     if request.unchanged_table is None or not {links[0], links[-1]} <= set(request.robot.tree.links):

@@ -1,8 +1,9 @@
-"""Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
+"""Run a command with exit codes, error messages and a clean stop on signals.
 
-SIGTERM and SIGHUP stop `urdfkin validate` like an interrupt: finished results are saved. Exit code 1 always
-means a negative result, such as a disagreement, and never a crash. Python exits with 1 after an uncaught
-exception, so urdfkin catches unexpected exceptions and exits with 70.
+SIGTERM and SIGHUP stop `urdfkin validate` like an interrupt: finished results are saved.
+
+Exit code 1 means a negative result, such as a disagreement, and never a crash. After an uncaught exception,
+Python would exit with 1. urdfkin therefore catches unexpected exceptions and exits with 70.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, default: int) -> int:
-        """Return 128 + n after signal n, as in shells; without a signal, return `default`.
+        """Return 128 + n after signal n, or `default` without a signal.
 
         A signal does not change the exit code 1, which reports a disagreement.
         """
@@ -42,7 +43,8 @@ class Stop:
     def interrupting(self, function: Callable[[_T], None]) -> Callable[[_T], None]:
         """Return `function` with a check for a signal, which raises KeyboardInterrupt.
 
-        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
+        Python ignores exceptions in destructors. In a destructor, a signal handler's exception would
+        therefore get lost.
         """
 
         def call(argument: _T) -> None:

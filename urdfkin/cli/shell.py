@@ -1,8 +1,9 @@
 """`urdfkin completion`: complete the words of a command in a shell. `urdfkin warm`: compile all kernels.
 
-Completion runs at each press of the Tab key, so completion imports no large package. A name in a malicious
-file, such as `$(...)`, could make the shell run a command. Completion therefore offers only names without
-characters that a shell interprets.
+Completion must be fast, so this module imports no large package.
+
+A malicious name, such as `$(...)`, could make the shell run a command. Completion therefore offers only names
+without characters that a shell interprets.
 """
 
 from __future__ import annotations
@@ -102,9 +103,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
     """Print the completion script for a shell.
 
     The script completes commands, options and the choices of options. The script also completes robots,
-    files, the frames of the robot on the command line, reference tables, codes of findings and numbers of
-    equations. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To activate the
-    script, add the line for your shell to its startup file:
+    files, reference tables, codes of findings and equation numbers. The completed frames are those of the
+    robot on the command line. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To
+    activate the script, add the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"
@@ -124,9 +125,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 def warm_command() -> None:
     """Compile all kernels (machine code) and store them, for container images and CI.
 
-    Without this command, urdfkin computes in plain Python at first. urdfkin compiles a kernel if plain Python
-    takes more than a second, for example for large batches. Each compilation takes some seconds. Kernels are
-    stored below XDG_CACHE_HOME. On another processor, the kernels are compiled again.
+    Without this command, urdfkin computes in plain Python at first. After more than a second in plain Python,
+    urdfkin compiles a kernel. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.
+    On another processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """

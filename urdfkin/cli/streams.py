@@ -1,11 +1,11 @@
 """Write to the standard streams without tracebacks, and escape control characters in names.
 
-A command ends without a traceback if standard output is closed, if the disk is full, or if the reader of a
-pipe exits early. The same applies if the encoding does not support a character of a joint's name.
+A write can fail for several reasons: standard output is closed, the disk is full, or a pipe's reader exits
+early. The encoding may also lack a character of a joint's name.
 
-`wrap_streams` wraps standard output and standard error in a `SafeStream`, which escapes control characters
-and commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of
-output. The function `say` and the class `Terminal` escape line feeds in names.
+`wrap_streams` wraps standard output and standard error in a `SafeStream`. A `SafeStream` escapes control
+characters and commands of CI services. Most line feeds end a line of output, so a `SafeStream` does not
+escape them. The function `say` and the class `Terminal` escape line feeds in names.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ def flush_output() -> None:
 
 
 class _RawStream(io.FileIO):
-    """A standard stream; the first write error on stdout ends the command, errors on stderr are ignored."""
+    """A standard stream: a write error on stdout ends the command.
+
+    Write errors on stderr are ignored.
+    """
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)
@@ -68,7 +71,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _report_write_errors(stream: Any, descriptor: int) -> Any:
-    """Wrap a standard stream, so that it reports write errors; return other streams unchanged."""
+    """Make a standard stream report write errors; return other streams unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -89,7 +92,7 @@ def _open_closed_streams() -> None:
 
     Otherwise, the next opened file would get the stream's descriptor.
 
-    Standard input is opened write-only and standard output read-only, so that their use fails.
+    Standard input is opened write-only and standard output read-only. Their use therefore fails.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -196,7 +199,7 @@ class SafeStream:
 
 
 def _escape_unprintable(text: str) -> str:
-    """Escape unprintable characters as in JSON, TOML and Python, except line feeds and tabs."""
+    """Escape unprintable characters, except line feeds and tabs, as in JSON."""
     if text.isprintable():
         return text
     return "".join(c if c in "\n\t" or c.isprintable() else escape_sequence(c) for c in text)
@@ -234,7 +237,7 @@ def say_file_content(text: str) -> None:
 
 
 def escape_for_terminal(text: str) -> str:
-    """Escape a text in the same way as `say_file_content`, but do not print the text."""
+    """Escape a text as `say_file_content` does, without printing."""
     return SafeStream(sys.stdout).escape_file_content(text)
 
 

@@ -22,7 +22,7 @@ class Terminal(Console):
         safe.styled = self.is_terminal
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print tables and texts; texts are not wrapped, so that users can copy them."""
+        """Print tables and texts; texts are not wrapped, so users can copy them."""
         texts = [escape_unprintable(o) if isinstance(o, str) else o for o in objects]
         only_text = all(isinstance(o, str) for o in objects)
         if self.is_terminal or only_text:
