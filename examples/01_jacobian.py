@@ -1,7 +1,7 @@
-"""Compute the Jacobian at a pose that names joints and their values, and interpret a column of the Jacobian.
+"""Compute the Jacobian at a pose with named joints, and interpret a column.
 
-You learn how to name joints, which units apply, how rows and columns are ordered, and how results are
-checked.
+You learn how to name joints and which units apply. You also learn the order of rows and columns, and how
+results are checked.
 """
 
 import numpy as np

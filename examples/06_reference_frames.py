@@ -1,4 +1,4 @@
-"""Compute one velocity in three reference frames, and convert it from one reference frame to another.
+"""Compute one velocity in three reference frames, and convert between these frames.
 
 You learn that LOCAL, WORLD and LOCAL_WORLD_ALIGNED have the same meaning as in Pinocchio.
 """

@@ -1,6 +1,7 @@
 """Compute the motion of a robot on a moving base.
 
-You learn two ways: pass a known motion of the base as `BaseMotion`, or add a floating root joint.
+You learn two ways to describe a moving base. Pass a known motion as `BaseMotion`, or add a floating root
+joint.
 """
 
 import numpy as np

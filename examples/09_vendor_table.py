@@ -1,8 +1,8 @@
 """Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
-You learn that the table and the URDF may have different base frames, tool frames and zero positions of the
-joints. The function `compare` first fits the two frames and the zero positions. Then `compare` computes the
-largest distance between the table's tip and the URDF's tip, and lists the cells of the table that differ.
+You learn that table and URDF may have different base frames, tool frames and joint zeros. The function
+`compare` first fits these frames and zeros. Then `compare` computes the largest distance between the tips of
+table and URDF. `compare` also lists the table's cells that differ.
 """
 
 from dataclasses import replace

@@ -1,13 +1,13 @@
-"""Check reports, comparisons, the documentation site and the viewer in Chromium, as a reader uses them.
+"""Check reports, comparisons, the site and the viewer in Chromium.
 
-Each page is opened at four widths, in a light and a dark theme. The script runs the accessibility checker
-axe, and looks for serious violations, errors in the console, sideways scrolling and requests to other hosts.
-The script also moves through the page with the Tab key, checks the HTML, and prints the page to a PDF.
-`--output` saves pictures of all screens and of the printed pages.
+Each page is opened at four widths, in two themes (light and dark). The script runs the accessibility checker
+axe, and reports serious violations. The script also reports console errors, sideways scrolling and requests
+to other hosts. The script also moves through the page with the Tab key. Further steps check the HTML, and
+print the page to a PDF. `--output` saves pictures of all screens and of the printed pages.
 
 The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. Three tools are
-optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils, which converts the pages
-of the PDF to pictures.
+optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils. Debian's poppler-utils
+converts the PDF's pages to pictures.
 
     npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
     python -m scripts.audit_pages --output /tmp/audit

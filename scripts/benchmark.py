@@ -1,14 +1,13 @@
-"""Compare the speed of urdfkin, Pinocchio and other libraries for the same computations, in one process.
+"""Compare the speed of urdfkin, Pinocchio and other libraries, in one process.
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
 The script first compares the results of all libraries, and fails if they differ. Each round then times every
-library once. Ratios are therefore reliable even on a machine with other load, but absolute times are not. The
-script prints medians, minima and ratios of medians. A library that is not installed is listed, but not
-measured.
+library once. Ratios are therefore reliable under other load, but absolute times are not. The script prints
+medians, minima and ratios of medians. A library that is not installed is listed, but not measured.
 
-The section `where` measures the time of each step of a batch, and of each step of a single call. The section
-`first` measures the first call of each quantity, in a new process.
+The section `where` measures the time of each step, for a batch and for a single call. The section `first`
+measures each quantity's first call, in a new process.
 """
 
 import argparse

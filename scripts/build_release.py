@@ -5,7 +5,7 @@
 
 The script builds the sdist from the checkout and the wheel from the sdist. The script builds twice and
 compares the bytes. Then `twine check --strict` and `check-wheel-contents` check the sdist and the wheel. The
-SBOM (CycloneDX, JSON) lists the packages that a new virtual environment with the wheel contains; `--sbom-of
+SBOM (CycloneDX, JSON) lists the packages in a new virtual environment with the wheel. The option `--sbom-of
 PYTHON` takes an existing environment instead, without network. SHA256SUMS has one line for each file. Exit 1:
 a check fails.
 """

@@ -2,10 +2,10 @@
 
     python scripts/changelog_gate.py [--base REVISION]
 
-The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
-count as changed. If no user notices the change, add the line `No-changelog: <reason>` to a commit message of
-the branch. Without `--base`, the script finds no base in some cases, for example on main or in a shallow
-clone. The script then prints "changelog not checked" with the reason, and exits with code 0.
+The base is the commit where the branch left `main` (or `origin/main`). Files that were only moved do not
+count as changed. If no user notices the change, add `No-changelog: <reason>` to a commit message. Without
+`--base`, the script may find no base (on main, in a shallow clone). The script then prints "changelog not
+checked" and the reason. The exit code is 0.
 """
 
 import argparse

@@ -13,9 +13,9 @@
 
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. GCC and Clang compile the C code; a missing compiler is skipped. The
-compiled programs compute single configurations and batches. NumPy runs the format `numpy` in double
-precision, and the format `array` in double and single precision. GCC compiles CUDA's host functions. The leaf
-links have a fixed random order, so that a stopped run has checked a random sample.
+compiled programs compute single configurations and batches. NumPy runs the formats `numpy` and `array` in
+double precision. For `array`, NumPy also uses single precision. GCC compiles CUDA's host functions. The leaf
+links have a fixed random order. A stopped run has therefore checked a random sample.
 
 Exit 1: an error exceeds its bound, a function is not verified, or a compiler prints a warning.
 """

@@ -5,9 +5,8 @@
     python scripts/check_forms.py --toolbox PYTHON     # another interpreter, with roboticstoolbox
     python scripts/check_forms.py --forms sympy latex  # some formats only
 
-LaTeX tables are compiled and must fit on the page of an article. The code of a format is not run if its
-interpreter or library is missing. Exit 1: results of a format differ by more than rounding, or a LaTeX table
-is too wide.
+LaTeX tables are compiled and must fit on the page of an article. Without its interpreter or library, a format
+is not run. Exit 1: results of a format differ by more than rounding, or a LaTeX table is too wide.
 """
 
 import argparse
@@ -175,7 +174,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return each table's excess over the width of the text (points); 0 if the table fits."""
+    """Return each table's excess width (points); 0 if the table fits."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")

@@ -4,11 +4,10 @@
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. After
-a check that takes longer than `--patience`, the script skips the larger documents with the same kind of
-content.
+a check that is longer than `--patience`, larger documents of this kind are skipped.
 
-Each document repeats one kind of content, as a file from a faulty exporter or an attacker may do. Even if
-urdfkin rejects the file, the time and memory of the check must be proportional to the file's size.
+Each document repeats one kind of content. Faulty exporters and attackers may write such files. Time and
+memory must be proportional to the file's size, even if urdfkin rejects the file.
 """
 
 import argparse
@@ -161,7 +160,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return the processor time (s) and the memory with the findings (MB), both per MB of the document."""
+    """Return processor time (s) and memory with the findings (MB), per MB of document."""
 
     def read_usage() -> tuple[float, float]:
         return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

@@ -1,7 +1,7 @@
-r"""Hooks of mkdocs that generate and convert pages of the documentation site; mkdocs.yml refers to them.
+r"""Generate and convert pages of the site; mkdocs.yml refers to these hooks.
 
-The pages of commands and of the library are generated from the program, so they are always current. A formula
-between $` and `$ becomes MathML. A lesson is also available as a notebook.
+The pages of commands and of the library are generated from the program. A formula between $` and `$ becomes
+MathML. A lesson is also available as a notebook.
 """
 
 import html

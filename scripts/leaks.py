@@ -1,4 +1,4 @@
-"""Check for leaks of memory and files: load N different robots, and print the memory in use after each part.
+"""Check for leaks: load N robots, and print the memory after each part.
 
 python -m scripts.leaks 10000
 """

@@ -1,8 +1,8 @@
 """Draw the imports between packages. Write docs/images/architecture.svg and a table in docs/architecture.md.
 
-docs/architecture.toml defines the packages and their order. tests/test_architecture.py checks the imports
-with the functions of this script. Every import counts: imports for types, imports inside functions, and
-modules that are named in a string for a lazy import.
+The file docs/architecture.toml defines the packages and their order. The test tests/test_architecture.py
+checks the imports with this script's functions. Every import counts, also imports for types and inside
+functions. Module names in strings for lazy imports count too.
 """
 
 import ast

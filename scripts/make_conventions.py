@@ -1,12 +1,12 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
-For most rows, the script computes a result of each library for a random motion of a given robot. The script
-also computes the quantity by several definitions. Exactly one definition must agree with the library's
-result, and the page shows this definition. A test checks that the page is current.
+For most rows, each library computes a result for a random motion of a robot. The script also computes the
+quantity by several definitions. Exactly one definition must agree with the library's result. The page shows
+this definition. A test checks that the page is current.
 
-The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
-first runs each installed library on all robots of the catalogue. Each library uses its own convention. The
-script writes the results to conventions.toml.
+The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, each installed
+library first reads all robots of the catalogue. Each library uses its own convention. The script writes the
+results to conventions.toml.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure

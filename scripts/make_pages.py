@@ -4,10 +4,10 @@
     python scripts/make_pages.py findings accuracy   # some pages
 
 Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
-with the output of this script. The pages on accuracy and enclosures take minutes to compute, so tests check
-only some numbers on these two pages. In docs/performance.md, the picture and the parts `figures: ...` show
-the numbers of docs/performance.json. `python scripts/benchmark.py --json docs/performance.json` measures
-these numbers.
+with the output of this script. The pages on accuracy and enclosures take minutes to compute. Tests therefore
+check only some numbers on these pages. In docs/performance.md, the picture and `figures: ...` show the
+numbers of docs/performance.json. `python scripts/benchmark.py --json docs/performance.json` measures these
+numbers.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Make pictures for the README and the site: the reference frames, and screenshots of report and viewer.
+"""Make pictures of reference frames, and screenshots of report and viewer.
 
 The script needs the extras `plots`, `view` and `test`, and Debian's chromium and chromium-driver.
 """

@@ -3,10 +3,10 @@
     python scripts/measure_start.py            # measure, write the table; exit 1 if a time is too long
     python scripts/measure_start.py --rounds 3
 
-Each row of the table is a command that runs in a new process. In each round, every command runs once. The
-ratio of a row is the command's median time, divided by the median time of `import numpy, pinocchio`. If the
-machine has other load, both times grow, and the ratio hardly changes. The bytecode of all modules already
-exists, as after an installation. A fresh cache is an empty folder for compiled kernels.
+Each row of the table is a command that runs in a new process. In each round, every command runs once. A row's
+ratio is a quotient of median times: command / `import numpy, pinocchio`. Other load of the machine increases
+both times, but hardly changes the ratio. The bytecode of all modules already exists, as after an
+installation. A fresh cache is an empty folder for compiled kernels.
 """
 
 import argparse

@@ -78,9 +78,9 @@ def _read_tests() -> dict[Path, str]:
 
 
 def find_near_tests(path: Path) -> list[str]:
-    """Return the test files that mention a module, and the test files of its package.
+    """Return the test files that mention a module or belong to the module's package.
 
-    For a package without test files, return test_robot.py and the files in tests/verify and tests/laws.
+    For a package without test files, return test_robot.py, tests/verify and tests/laws.
     """
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(

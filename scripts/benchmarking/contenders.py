@@ -192,7 +192,7 @@ def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 def dynibo(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo.
 
-    dynibo stores a Jacobian column by column, with rows [angular; linear] and joints in breadth-first order.
+    Jacobians of dynibo are column-major, with rows [angular; linear]. The joints are in breadth-first order.
     """
     import dynibo
 

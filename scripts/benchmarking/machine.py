@@ -1,6 +1,6 @@
-"""Describe the machine; measure the memory of a batch and the time of a first use in new processes.
+"""Describe the machine; measure a batch's memory and the time of a first use.
 
-This module runs itself in a new process, which has loaded no kernel and no library yet.
+This module runs itself in new processes. A new process has loaded no kernel and no library.
 """
 
 import json

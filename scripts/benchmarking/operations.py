@@ -1,8 +1,8 @@
 """Count the additions and multiplications that compute a result for one configuration.
 
 The module calls urdfkin's functions with objects that record each operation. A fused multiply-add counts as
-two operations, because manufacturers also count two for the peak performance of a processor. The negation -x
-does not count. A product with the constant 0 or 1 does not count.
+two operations. Manufacturers also count two operations for the peak performance. The negation -x does not
+count. A product with the constant 0 or 1 does not count.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Plot the times of all contenders, and urdfkin's time for several numbers of joints and batch sizes."""
+"""Plot all contenders' times, and urdfkin's time by joints and batch size."""
 
 import re
 from collections.abc import Mapping, Sequence

@@ -170,7 +170,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each step (ns per configuration), for each robot and quantity."""
+    """Yield each step's time (ns per configuration), for each robot and quantity."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [

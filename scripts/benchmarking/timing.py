@@ -1,8 +1,8 @@
-"""Measure the run time of each compared library, and check that all libraries compute the same numbers.
+"""Measure the run times of libraries, and compare the libraries' results.
 
 Each round measures every library once, in a different order. Ratios are therefore reliable on a noisy
 machine, and absolute times are not. Before each timed run, the contender computes once without timing. The
-processor's cache then contains the contender's data, and the threads of other contenders are idle.
+processor's cache then contains the contender's data. The threads of other contenders are then idle.
 """
 
 import gc
@@ -121,7 +121,7 @@ def measure_rows(
 
 @dataclass(frozen=True)
 class Calls:
-    """The lines of Python that call a library; the timed loop contains them directly."""
+    """The lines of Python that call a library, directly in the timed loop."""
 
     label: str
     #: Variables of the lines. The variables `q`, `v`, `a` always exist.

@@ -1,4 +1,4 @@
-"""A workload of the benchmark: one robot, one frame, and the configurations that all contenders compute."""
+"""The inputs of all contenders: one robot, one frame and configurations."""
 
 import contextlib
 import tempfile
@@ -80,7 +80,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a copy without visuals, collisions and mimic rules.
 
     All links get the same inertia, because some libraries need inertias.
-    The name `world` is replaced, because some libraries add a body of this name.
+    The name `world` is replaced, because some libraries add such a body.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))

@@ -1,6 +1,6 @@
-"""Test one robot: check it, load it, compute all quantities and compare them with Pinocchio.
+"""Test one robot: check, load, compute all quantities, compare with Pinocchio.
 
-Results of different calls must have the same bits, because all calls use the same forward recursion.
+All calls use the same forward recursion, so their results must have equal bits.
 """
 
 import traceback

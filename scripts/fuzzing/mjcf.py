@@ -1,10 +1,10 @@
 """Make random MJCF files with free joints, equality constraints and default classes.
 
-In some files, MuJoCo aligns free bodies with their inertial frames (attributes `alignfree` and `align`), or
-fuses static bodies (attribute `fusestatic`).
+In some files, MuJoCo aligns free bodies with their inertial frames (`alignfree`, `align`). Some files let
+MuJoCo fuse static bodies (`fusestatic`).
 
-A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
-and checks the equality constraints, independently of urdfkin's MJCF reader.
+A file depends only on the seed, its family and its number. MuJoCo computes the poses of all bodies and sites,
+and checks the equality constraints. MuJoCo does not use urdfkin's MJCF reader.
 """
 
 import random

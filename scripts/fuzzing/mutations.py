@@ -1,7 +1,7 @@
-"""Make mutants of real URDFs; the same seed and number give the same bytes on any machine.
+"""Make mutants of real URDFs; seed and number determine the bytes.
 
-There are four families: bytes, tokens, attributes, and structure (new parents, closed loops, swapped names,
-changed types and mimic rules).
+There are four families: bytes, tokens, attributes and structure. Structure means new parents, closed loops,
+swapped names, changed types and mimic rules.
 """
 
 import contextlib

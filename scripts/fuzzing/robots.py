@@ -1,6 +1,6 @@
-"""Make random robots, which are trees with all kinds of joints and some unusual content.
+"""Make random robots: trees with all kinds of joints and unusual content.
 
-Most of these robots are legal: a rejected robot would not test the computations. A robot depends only on the
+Most of these robots are legal. A rejected robot would not test the computations. A robot depends only on the
 seed, its family and its number.
 """
 
@@ -70,7 +70,10 @@ def usual_length(rng: random.Random) -> float:
 
 
 def odd_length(rng: random.Random) -> float:
-    """Return a length of random magnitude, below 1e301 so that a sum of lengths does not overflow."""
+    """Return a length of random magnitude.
+
+    Lengths are below 1e301, so a sum of lengths does not overflow.
+    """
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
     return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)

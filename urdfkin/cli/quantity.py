@@ -446,9 +446,9 @@ REPRESENTATIONS = (
         type=click.Choice(REPRESENTATIONS),
         metavar="NAME",
         default="ZYZ",
-        help="Representation of the orientation. rpy: roll, pitch, yaw as in a URDF. quaternion: qx, qy, qz, qw."
-        " ZYZ: Euler angles about moving axes (capital letters). xyz: fixed axes (small letters); the same"
-        " as rpy.",
+        help="Representation of the orientation. rpy: roll, pitch, yaw as in a URDF. quaternion: qx, qy, qz,"
+        " qw. ZYZ: Euler angles about moving axes (capital letters). xyz: fixed axes (small letters); the"
+        " same as rpy.",
     ),
     click.option(
         "--nearest",
