@@ -11,7 +11,7 @@ import urdfkin
 robot = urdfkin.load("panda")  # The argument is a name, a path, or URDF text.
 # The text changes three joints of the configuration `neutral`.
 # `-30deg` is in degrees; `1.5` and `-2*pi/3` are in radians.
-# A dict also works: keys are joint names.
+# You can also pass a mapping from joint names to values.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
 J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85

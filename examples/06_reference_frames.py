@@ -20,8 +20,8 @@ local = robot.velocity(q, v, "tool0", "local")
 aligned = robot.velocity(q, v, "tool0")  # the default frame
 assert np.allclose(R_world_tool @ local[:3], aligned[:3])
 
-# WORLD is the velocity of a point of the body.
-# This point coincides with the world's origin.
+# WORLD is the velocity of a body point.
+# This body point coincides with the world's origin.
 p_world_tool = robot.placement(q, "tool0")[:3, 3]
 there = aligned[:3] - np.cross(aligned[3:], p_world_tool)
 assert np.allclose(there, robot.velocity(q, v, "tool0", "world")[:3])

@@ -148,9 +148,7 @@ def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda
     scope: dict[str, Any] = {"__name__": "measured"}
     exec(compile(write(code, "torch"), "<torch>", "exec"), scope)
     if not max(scope["check"](device).values()) <= 1.0:
-        raise ValueError(
-            "a number computed by the code exported for PyTorch is outside the number's error bound"
-        )
+        raise ValueError("a result of the code for PyTorch exceeds its error bound")
     for function in code.functions:
         call = scope[function.name]
         callables: dict[str, Callable[..., Any]] = {"PyTorch": call, "torch.compile": torch.compile(call)}

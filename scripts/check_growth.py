@@ -179,17 +179,17 @@ if __name__ == "__main__":
     option(
         "words",
         nargs="*",
-        help="measure only kinds of content whose names contain one of these texts (default: all)",
+        help="part of a kind's name, such as `number` (default: all kinds of content)",
     )
-    option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
-    option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
-    option("--one", type=int, help="check one document with this size in bytes, without further processes")
+    option("--sizes", default="1,4,16,64", help="document sizes in MB, separated by commas")
+    option("--patience", type=float, default=600.0, help="maximum time for one document, in seconds")
+    option("--one", type=int, help="check only one document, of this size in bytes")
     options = parser.parse_args()
     if options.one is not None:
         print(measure_cost(options.words[0], options.one))
         sys.exit()
     sizes = [float(size) for size in options.sizes.split(",")]
-    heads = ["time and memory per MB, by content and file size", *(f"{size:g} MB" for size in sizes)]
+    heads = ["kind of content (time and memory per MB)", *(f"{size:g} MB" for size in sizes)]
     print(table(heads, [], left=1))
     for kind in (kind for kind in KINDS if not options.words or any(word in kind for word in options.words)):
         cells: list[str] = []

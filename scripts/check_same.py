@@ -37,7 +37,7 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of an element of a placement.
+#: Maximum rounding error of a placement's element.
 #: An element is a coordinate (m) or a rotation entry.
 ROUNDING = 1e-10
 

@@ -25,7 +25,7 @@ _ROBOT = "urdfkin.robot.Robot"
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
-        "`load` reads a robot; the class `Robot` has its names, joints, limits and all computations.",
+        "`load` reads a robot. The class `Robot` has names, joints, limits and computations.",
         "load robots Robot name source path origin sha256 urdf joints joint_names link_names "
         "link_frames frame_names all_frames frames tip_frame coordinate_names velocity_names nq nv "
         "root_joint limits velocity_limits view",
@@ -87,7 +87,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: Matches GitHub's markup for an image in light and dark.
+#: Matches GitHub's markup of an image with two themes.
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )

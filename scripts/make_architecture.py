@@ -22,7 +22,7 @@ ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
 PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
-#: Maps a foreign library to its allowed importing modules.
+#: Modules that may import each foreign library.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")

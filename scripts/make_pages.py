@@ -67,7 +67,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: Maps a size limit of `urdfkin check` to default and unit.
+#: Maps an option of `urdfkin check` to default and unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),

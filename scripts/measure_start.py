@@ -32,7 +32,7 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 @dataclass(frozen=True)
 class Row:
     name: str  # label of the row on the page
-    arguments: tuple[str, ...]  # of `python`; a URDF file's path replaces ROBOT
+    arguments: tuple[str, ...]  # arguments of `python`; ROBOT is a URDF path
     max_ratio: float = math.inf  # maximum time / time of `import numpy, pinocchio`
     empty_cache: bool = False  # Whether the process starts without compiled kernels on disk.
 

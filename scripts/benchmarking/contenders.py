@@ -170,7 +170,7 @@ def _compute_part(start: int, stop: int) -> None:
 
 
 # Some libraries order rows or coordinates differently.
-# The measured times exclude a change of the order.
+# The measured times exclude a conversion of the order.
 
 #: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]

@@ -17,7 +17,7 @@ from urdfkin.urdf.records import FURTHER_LIMITS
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
-#: Names like internal names of urdfkin or Pinocchio.
+#: Internal names of urdfkin and Pinocchio, and similar names.
 INTERNAL_NAMES = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",

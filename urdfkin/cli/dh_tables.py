@@ -156,7 +156,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged_table is not None:
         table = read_table_or_screws(expand_home(request.unchanged_table))
-        # Screws are not a table, so the code below continues.
+        # For screws, the code below derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None

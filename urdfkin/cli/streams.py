@@ -117,7 +117,7 @@ def _show_warning(
 #: Escape sequences for colours and progress bars (package `rich`).
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
 #: Maximum length of an unfinished line that is stored completely.
-#: Several writes can form one CI command in this line.
+#: The line is stored, because several writes can form one command.
 _MAX_STORED = 64
 
 

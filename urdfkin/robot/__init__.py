@@ -166,7 +166,7 @@ class Robot(Displayable):
         #: Maps a joint to its terms of `single`.
         #: None: the source is not a USD stage in single precision.
         self.single_terms: SingleRoundingTerms | None = None
-        #: USD path of the prim (scene object) of each link.
+        #: Maps a link to the USD path of its prim.
         #: Without a USD stage, the mapping is empty.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
