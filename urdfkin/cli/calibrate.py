@@ -1,4 +1,4 @@
-"""`urdfkin calibrate`: fit a robot's parameters to measured poses, and write the calibrated file."""
+"""`urdfkin calibrate`: fit parameters to measured poses, and write the calibrated file."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def calibrate_command(
     Without --poses and --ur, the command lists the parameters that are identifiable in principle.
 
     The command refuses an implausible calibration, and prints the likeliest cause. Possible causes are angles
-    in degrees, a joint's wrong sign, or another pose's joint values. With --force, the command writes the
+    in degrees, wrong joint signs, or joint values of other poses. With --force, the command writes the
     calibration nevertheless. If the joint values look like degrees, --radians is also needed.
 
     Exit 0: verified, or only a list of parameters. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or

@@ -272,7 +272,7 @@ size_limit_options = combine(
 @click.option(
     "--unsafe-fixes",
     is_flag=True,
-    help="With --fix or --diff: include fixes with a rotation larger than a rounding error.",
+    help="With --fix or --diff: include fixes that rotate a joint beyond rounding errors.",
 )
 @click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
 @click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")
@@ -294,11 +294,11 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     """Check URDF files and print all findings, with code, line, cause and remedy.
 
     A FILE is the path of a URDF, USD or MJCF file. FILE can also be a name from `urdfkin robots`, or - for
-    standard input. The command checks all *.urdf files in a FOLDER and its subfolders, except hidden
-    subfolders. Without FILE and FOLDER, the current folder is checked.
+    standard input. In a FOLDER and its subfolders, the command checks all *.urdf files. Hidden subfolders are
+    skipped. Without FILE and FOLDER, the current folder is checked.
 
-    A .xacro file is expanded in a restricted process. This process can only compute and read certain folders,
-    such as the file's package (docs/xacro.md).
+    A .xacro file is expanded in a restricted process. This process can only compute, and read certain folders
+    (docs/xacro.md). One of these folders is the file's package.
 
     The option --changed-since origin/main reports the new findings of a pull request. Settings are in the
     table [tool.urdfkin] of pyproject.toml (docs/check.md).

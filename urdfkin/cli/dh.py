@@ -198,8 +198,8 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
-    The path may go down the tree of links, up, or first up and then down. The table has the file's angles and
-    lengths, without rounding. The option --snap rounds angles, and prints a bound on the tip's displacement.
+    The path may go down, up, or first up and then down. The table has the file's angles and lengths, without
+    rounding. The option --snap rounds angles, and prints a bound on the tip's displacement.
 
     ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be a table (.toml,
     .json, .csv, .tsv, .md, .tex, .txt). The command then writes the same table in the chosen convention.

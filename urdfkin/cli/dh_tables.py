@@ -171,7 +171,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
 
 
 def _with_link_frames(request: DHRequest, table: DHTable) -> DHTable:
-    """Name the base and tip as links, because a joint can have the same name."""
+    """Name base and tip as links, because joints can have equal names."""
     links = link_names(table)
     # A table from screws already has names such as "link:tip".
     if request.unchanged_table is None or not {links[0], links[-1]} <= set(request.robot.tree.links):

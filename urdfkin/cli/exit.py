@@ -1,9 +1,9 @@
-"""Run a command with exit codes, error messages and a clean stop on signals.
+"""Run a command: exit codes, error messages and a clean stop.
 
 SIGTERM and SIGHUP stop `urdfkin validate` like an interrupt: finished results are saved.
 
-Exit code 1 means a negative result, such as a disagreement, and never a crash. After an uncaught exception,
-Python would exit with 1. urdfkin therefore catches unexpected exceptions and exits with 70.
+Exit code 1 means a negative result, such as a disagreement. A crash never has exit code 1. After an uncaught
+exception, Python would exit with 1. urdfkin therefore catches unexpected exceptions and exits with 70.
 """
 
 from __future__ import annotations

@@ -83,11 +83,11 @@ def _indent(code: str) -> str:
 def explain_command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
-    CODE is a finding's code or its short name. The page of a finding has the reason, a bad example and a good
+    CODE is a finding's code or its short name. A finding's page has the reason, a bad example and a good
     example. The page also describes the behaviour of other programs.
 
     EQUATION is the number of an equation in the textbook, such as 7.130. The page has the equation, the
-    function that implements the equation, and the function's check.
+    implementing function, and the function's check.
 
     QUESTION is the name of a question, or a word of the name.
 
@@ -141,7 +141,7 @@ def explain_command(topic: str | None) -> None:
 
 
 def _list_matches(topic: str) -> list[str]:
-    """Return a line for each code and equation that matches all words of `topic`."""
+    """Return a line for each code and equation with all words of `topic`."""
     words = topic.lower().split()
     if not any(map(str.isalpha, topic)):
         return []

@@ -114,9 +114,9 @@ def export_command(
     verify: bool,
     output: Path | None,
 ) -> None:
-    """Write a frame's kinematics as code without loops, with test vectors in the file.
+    """Write a frame's kinematics as code without loops, with test vectors.
 
-    The code contains the robot's constants, and computes each joint's sine and cosine once. Before the
+    The code contains the robot's constants. Each joint's sine and cosine are computed once. Before the
     command writes the file, Pinocchio checks the expressions. The file states the largest disagreement of
     each quantity.
 
@@ -204,14 +204,15 @@ def write_vectors(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
 
     The results are computed at 50 digits, and written with 17 digits.
 
-    The command writes the test vectors of the named robots. Without a name, the command writes test vectors
-    of the catalogue and of some 70 small robots. Each small robot tests one feature of URDF. Each robot has a
-    JSON file and a text file. The text file contains the same numbers, separated by tabs. The file SHA256SUMS
-    has the digests of all files.
+    The command writes the test vectors of the named robots. Without a name, the catalogue and some 70 small
+    robots are used. Each small robot tests one feature of URDF. Each robot has a JSON file and a text file.
+    The text file contains the same numbers, separated by tabs. The file SHA256SUMS has the digests of all
+    files.
 
-    The results are the placement, velocity, Jacobian, Jacobian rate and Hessian, and the classical and
-    spatial accelerations. The files contain the placement once. All other quantities are in the reference
-    frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on --samples.
+    The results are placement, velocity, Jacobian, Jacobian rate and Hessian. The classical and the spatial
+    acceleration are results too. The files contain the placement once. All other quantities are in the
+    reference frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on
+    --samples.
     """
     from urdfkin.validation import vectors
 

@@ -66,7 +66,7 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--within",
     type=NumberInRange(0.0),
-    help="Largest allowed distance (m) and angle (rad) between equal frames of A and B. The exit code is 0"
+    help="Largest allowed distance (m) and angle (rad) between matching frames of A and B. The exit code is 0"
     " only if urdfkin proves this limit.",
 )
 @click.option(
@@ -117,15 +117,15 @@ def same_command(
     If you name more than two robots, the command compares each pair. A and B are paths, names from `urdfkin
     robots`, or Denavit-Hartenberg tables.
 
-    A and B are the same robot if all joint screws and zero-configuration link poses agree. Fixed links, names
-    and the order of joints may differ.
+    A and B are the same robot if all joint screws agree. In the zero configuration, all link poses must also
+    agree. Fixed links, names and the order of joints may differ.
 
     Some changes of B can make B the same robot as A. A and B are then equivalent. For example, B may need
     another base pose, or another joint zero.
 
-    If A and B differ, the command compares each frame of B with A's frame. For the largest distance, the
-    command prints a lower and an upper bound. In the printed configuration, the distance is at least the
-    lower bound. The upper bound is proven for all configurations within the joint limits.
+    If A and B differ, the command compares matching frames. For the largest distance, the command prints a
+    lower and an upper bound. In the printed configuration, the distance is at least the lower bound. The
+    upper bound is proven for all configurations within the joint limits.
 
     The numbers of a USD file are rounded to single precision. These rounding errors may explain the
     difference of every joint. A and B are then the same up to single precision.
@@ -134,8 +134,8 @@ def same_command(
     1: the models are different. 2: bad input.
 
     With --strict, the exit code is also 1 for equivalent models. The same applies to differences without
-    effect on motion. Examples are other limits, the type revolute instead of continuous, or an additional
-    fixed link.
+    effect on motion. Examples are other limits, revolute instead of continuous joints, or additional fixed
+    links.
 
     With --within, the command does not change B before the comparison. Exit 0: every frame is proven to be
     within the given distance. 1: the proof fails for at least one frame.
@@ -228,7 +228,7 @@ def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @source_options
 @answer_command()
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
-    """List all changes from OLD to NEW, and how far the changes move frames.
+    """List all changes from OLD to NEW, and the displacements of frames.
 
     For each changed joint, the command prints the most displaced frame. The printed displacement is the
     largest in all configurations within the joint limits. If the changes only rotate frames, the command
@@ -298,7 +298,7 @@ def readers_command(robot: str, libraries: str | None, samples: int, seed: int) 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
     Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each
     library reads the file in its own process. The command compares the poses of all links with urdfkin's
-    poses. If a library reads a joint differently, the command names the cause in the file. An example is the
+    poses. For a joint that a library reads differently, the command names the cause. An example is the
     joint's `axis`.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.

@@ -586,7 +586,7 @@ _BASE_MOTION_OPTIONS = {
 def base_motion_options(inputs: str) -> Callable[[_F], _F]:
     """Make the options for the motion of the root link.
 
-    `inputs` contains q for the pose, v for the velocity and a for the acceleration.
+    `inputs` contains the letters of the options: q (pose), v (velocity), a (acceleration).
     """
     return combine(*(_BASE_MOTION_OPTIONS[letter] for letter in inputs))
 

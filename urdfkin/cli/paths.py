@@ -51,13 +51,13 @@ def chain_command(
 ) -> Answer:
     """List the joints and axes on the path between two frames (section 7.5).
 
-    The table shows one configuration, in metres and in the base's axes. A joint has the axis z, the origin O,
-    and the vector d to the next origin. The last vector d leads to the tip.
+    The table shows one configuration, in metres and in the base's axes. A joint's row has axis z, origin O,
+    and vector d to the next origin. The last vector d leads to the tip.
 
-    At a joint with the mark "backwards", the path leads from the child link to the parent link. The axis z of
-    such a joint is reversed. The joint's coordinate therefore has the same sign as in the URDF. The table
-    does not list fixed joints. The offset of a fixed joint is a part of a vector d. The option --q gives the
-    configuration of the whole robot.
+    At a "backwards" joint, the path leads from the child link to the parent link. The axis z of such a joint
+    is reversed. The joint's coordinate therefore has the same sign as in the URDF. The table does not list
+    fixed joints. The offset of a fixed joint is a part of a vector d. The option --q gives the configuration
+    of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -144,9 +144,9 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 
     The result is the pose M in the zero configuration, and the screws. Each joint's screw is given in space
     axes and in body axes. A screw is a vector (w, v), with the angular velocity w first. In generated code,
-    the matrices Slist (space axes) and Blist (body axes) contain the screws as columns. The result can be
-    written as a TOML or JSON file. Commands that take a ROBOT can load this file. In your own file, name the
-    pose `M`, and the screws `space` or `body`.
+    screws are columns of the matrices Slist (space axes) and Blist (body axes). The result can be written as
+    a TOML or JSON file. Commands that take a ROBOT can load this file. In your own file, name the pose `M`.
+    Name the screws `space` or `body`.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -184,11 +184,11 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 def structure_command(
     robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
 ) -> Answer:
-    """Find an arm's parallel and intersecting axes, its class (such as SCARA) and solvers.
+    """Find an arm's parallel and intersecting axes, class (such as SCARA) and solvers.
 
-    The axes of a calibrated arm are never exactly parallel. Parallel axes and similar properties may
-    therefore deviate by up to 0.02 rad or 5 mm. The deviation is printed. Pinocchio checks the screws of the
-    arm's joints. JSON is in metres and radians.
+    The axes of a calibrated arm are never exactly parallel. The command therefore allows deviations of up to
+    0.02 rad or 5 mm. The deviation is printed. Pinocchio checks the screws of the arm's joints. JSON is in
+    metres and radians.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

@@ -284,8 +284,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
-    For a Hessian, a row is the derivative of a Jacobian column by a joint coordinate. Rows with only rounding
-    errors are left out.
+    A Hessian's row is a Jacobian column's derivative by a joint coordinate. Rows with only rounding errors
+    are left out.
     """
     import numpy as np
 
@@ -378,8 +378,8 @@ _POSE_FORMS = {
 def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any) -> Answer:
     """Compute a frame's pose (eq. 7.77) in the world or another frame, in metres.
 
-    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position with three
-    angles or with a quaternion. Pinocchio checks that these numbers give the same rotation as T.
+    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position with angles or
+    a quaternion. Pinocchio checks that these numbers give the same rotation as T.
 
     ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path may lead to a
     Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
@@ -462,8 +462,8 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
     Each row contains the time derivatives of the position and of the orientation numbers. These numbers are
-    Euler angles or a quaternion. In row i, only entry i of v is 1, and the others are 0. `urdfkin jacobian`
-    prints angular velocities instead.
+    Euler angles or a quaternion. Row i belongs to the joint velocity v_i = 1; all other velocities are 0.
+    `urdfkin jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 
@@ -502,9 +502,9 @@ def orientation_labels(representation: str) -> tuple[str, ...]:
 def imu_command(gravity: str, **_: Any) -> Answer:
     """Compute an accelerometer's and a gyroscope's readings on a frame, in its axes.
 
-    The accelerometer reads the proper acceleration in m/s^2. This is the position's second time derivative,
-    minus the acceleration of gravity. With the default --gravity, an accelerometer at rest reads 9.81 m/s^2
-    upwards. The gyroscope reads the angular velocity in rad/s.
+    The accelerometer reads the proper acceleration in m/s^2. This is the second time derivative of the
+    frame's position, minus gravity's acceleration. With the default --gravity, an accelerometer at rest reads
+    9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
 
     The input is a configuration --q, joint velocities --v and joint accelerations --a. The input may also be
     a batch of configurations, or a --trajectory.
@@ -545,7 +545,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     Each value has a guaranteed lower and upper bound. The bounds include the errors of the Jacobian and the
     decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular values. The
-    command also computes the manipulability's derivatives by the joint coordinates, from the Hessian.
+    Hessian yields the manipulability's derivatives by the joint coordinates.
 
     At a singularity, the command prints the rank and the lost directions. The command also prints the joints
     that cause the singularity. The manipulability may have no derivative at a singularity. CSV then contains

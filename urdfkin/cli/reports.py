@@ -223,12 +223,12 @@ def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
 
     The arguments are reports (JSON files) or folders. A folder is a store (`urdfkin validate --store`), or
     contains reports and stores. Runs are ordered by their start. A robot is identified by its source (a path
-    or a name in the catalogue). After the file was renamed, the robot is identified by its name. Changes and
+    or a catalogue name). After the file was renamed, the robot is identified by its name. Changes and
     regressions are defined as in `urdfkin report compare`. With `--output history.html`, the command writes
     charts. The HTML page works offline.
 
-    If a file cannot be used, the command prints the file's name and the reason. The other files are shown.
-    Exit 0: every file was used. 2: a file cannot be used.
+    For an unusable file, the command prints the file's name and the reason. The other files are shown. Exit
+    0: every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import as_html, document, read_history
 

@@ -77,12 +77,12 @@ _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 @robot_argument
 @answer_command()
 def info_command(robot: str) -> Answer:
-    """Show a robot's links, joints, axes, limits, mimic rules, and indices in q and v.
+    """Show links, joints, axes, limits, mimic rules, and indices in q and v.
 
-    The joints have the order of q, of v and of the Jacobian's columns. Pinocchio uses the same order of the
-    joints. The last line reports whether the file lists the joints in another order. Limits are in rad and
-    rad/s. The limits of prismatic joints are in m and m/s. The first link is the root. In the drawn tree, a
-    branch leads to each of several children. A link without a branch is the only child of the link above.
+    The joints have the order of q, v and the Jacobian's columns. Pinocchio uses the same order of the joints.
+    The last line reports whether the file lists the joints in another order. Limits are in rad and rad/s. The
+    limits of prismatic joints are in m and m/s. The first link is the root. In the drawn tree, a branch leads
+    to each of several children. A link without a branch is the only child of the link above.
     """
     loaded = load_robot(robot)
     data = {

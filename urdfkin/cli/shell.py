@@ -103,9 +103,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
     """Print the completion script for a shell.
 
     The script completes commands, options and the choices of options. The script also completes robots,
-    files, reference tables, codes of findings and equation numbers. The completed frames are those of the
-    robot on the command line. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To
-    activate the script, add the line for your shell to its startup file:
+    files, reference tables, finding codes and equation numbers. The completed frames are those of the robot
+    on the command line. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To activate
+    the script, add the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"

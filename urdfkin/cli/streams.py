@@ -1,11 +1,11 @@
 """Write to the standard streams without tracebacks, and escape control characters in names.
 
-A write can fail for several reasons: standard output is closed, the disk is full, or a pipe's reader exits
-early. The encoding may also lack a character of a joint's name.
+A write fails if standard output is closed, or if the disk is full. A write to a pipe fails if the reader
+exits early. The encoding may also lack a character of a joint's name.
 
 `wrap_streams` wraps standard output and standard error in a `SafeStream`. A `SafeStream` escapes control
-characters and commands of CI services. Most line feeds end a line of output, so a `SafeStream` does not
-escape them. The function `say` and the class `Terminal` escape line feeds in names.
+characters and commands of CI services. Most line feeds end an output line. A `SafeStream` therefore does not
+escape line feeds. The function `say` and the class `Terminal` escape line feeds in names.
 """
 
 from __future__ import annotations

@@ -53,8 +53,8 @@ def study_all(
 ) -> ValidationReport:
     """Run the accuracy study of each compared robot, and return the extended report.
 
-    `how` are arguments of `load`. `shard`, for example "1/4", selects the robots with their first sample in
-    this shard. An interrupt skips the remaining robots.
+    `how` are arguments of `load`. With `shard`, such as "1/4", only robots with their first sample in this
+    shard are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -208,7 +208,7 @@ def validate_command(
     it computes them.
 
     Configurations are random within the joint limits. The command adds the neutral configuration. Two more
-    configurations have all joints at their lower or upper limits. In 4 of 25 samples, joint velocities and
+    configurations have all joints at their lower or upper limits. In 4 of 25 samples, velocities and
     accelerations are a hundred times larger than usual.
 
     Disagreements are in multiples of eps * scale. The number eps is 2.2e-16. The number scale is the size of
@@ -318,7 +318,7 @@ def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
-    """Load the robot from a USD file now, without locked joints, as in `_load_stdin`."""
+    """Load a USD file now, without locked joints, as in `_load_stdin`."""
     from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}

@@ -96,8 +96,8 @@ def verify_command(
 ) -> Answer:
     """Compare your function or program with urdfkin and Pinocchio, within an error bound.
 
-    TARGET is FILE.py:FUNCTION. With TARGET FILE.py, the command checks all functions named after a quantity,
-    such as `jacobian`.
+    TARGET is FILE.py:FUNCTION. For FILE.py, the command checks all functions named after a quantity, such as
+    `jacobian`.
 
     The arguments of a function are q (nq,), v (nv,) and a (nv,), in rad, m and seconds. A function for a pose
     or a Jacobian has only the argument q. The function returns an array.

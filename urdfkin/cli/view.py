@@ -70,9 +70,9 @@ def view_command(
 ) -> None:
     """Show a robot in a browser tab: sliders, shapes, frames, DH frames and arrows.
 
-    The viewer starts at --q. Without --q, the viewer starts within the joint limits, as near to zero as
-    possible. The viewer shows the chosen frame's position, velocity and other numbers. Pinocchio checks these
-    numbers again after each motion of the robot. The viewer needs the package viser. Ctrl-C stops the viewer.
+    The viewer starts at --q. Without --q, the viewer starts at zero, or at the nearest allowed configuration.
+    The viewer shows the chosen frame's position, velocity and other numbers. Pinocchio checks these numbers
+    again after each motion of the robot. The viewer needs the package viser. Ctrl-C stops the viewer.
 
     With --trajectory, the viewer plays the samples of a CSV or .npz file. With --convention, the input field
     of q is in that convention.
