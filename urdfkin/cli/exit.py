@@ -43,8 +43,7 @@ class Stop:
     def interrupting(self, function: Callable[[_T], None]) -> Callable[[_T], None]:
         """Return `function` with a check for a signal, which raises KeyboardInterrupt.
 
-        Python ignores exceptions in destructors. In a destructor, a signal handler's exception would
-        therefore get lost.
+        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
         """
 
         def call(argument: _T) -> None:
