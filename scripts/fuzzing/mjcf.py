@@ -1,10 +1,10 @@
 """Make random MJCF files with free joints, equality constraints and default classes.
 
-In some files, MuJoCo aligns free bodies with their inertial frames (attributes `alignfree` and `align`), or
-fuses static bodies (attribute `fusestatic`).
+In some files, MuJoCo aligns free bodies with their inertial frames (`alignfree`, `align`). Some files let
+MuJoCo fuse static bodies (`fusestatic`).
 
-A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
-and checks the equality constraints, independently of urdfkin's MJCF reader.
+A file depends only on the seed, its family and its number. MuJoCo computes the poses of all bodies and sites,
+and checks the equality constraints. MuJoCo does not use urdfkin's MJCF reader.
 """
 
 import random
@@ -20,10 +20,11 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Tolerance for placements relative to `large` in `find_difference`; 1000 times larger for constraints.
+#: Maximum error of a placement, divided by `large`.
+#: The tolerance for constraints is 1000 times larger.
 _TOLERANCE = 1e-12
 
-# Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.
+# MuJoCo's own handler writes a log into the current folder.
 mujoco.set_mju_user_warning(lambda said: None)
 
 
@@ -76,7 +77,7 @@ class _RandomModel:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        # The axes of inertia of a rotated box are not parallel to the body's axes.
+        # The rotation of a box rotates the axes of inertia.
         for _ in range(rng.randint(1, 2)):
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
