@@ -52,7 +52,7 @@ class Stop:
     def raise_if_signal(self) -> None:
         """Raise KeyboardInterrupt if a signal has arrived.
 
-        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
+        Python ignores exceptions in destructors. In a destructor, a signal handler's exception gets lost.
         """
         if self.signal is not None:
             raise KeyboardInterrupt
