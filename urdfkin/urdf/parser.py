@@ -3,8 +3,8 @@
 The XML parser is expat. The parser reports the position of every start tag. Deep nesting needs no recursion.
 Namespace prefixes are kept. No other file is opened.
 
-Parsing stops at a document type declaration with brackets or an external file. Therefore, only the entities of
-XML itself are expanded, for example `&amp;`.
+Parsing stops at a document type declaration with brackets or an external file. Therefore, only the entities
+of XML itself are expanded, for example `&amp;`.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing. Every problem is a
 finding.

@@ -7,7 +7,7 @@ A prim with `PhysicsRigidBodyAPI` becomes a link. The link frame is the prim's f
 
 A joint prim contains two poses of the joint frame. A is the pose in the first body. B is the pose in the
 second body. The joint motion is J(q). In the first body, the second body has the pose A J(q) B^-1. If the
-second body is the parent, urdfkin exchanges A and B, and reverses the joint axis. In the second body, the
+second body is the parent, A and B are exchanged. The joint axis is then reversed. In the second body, the
 first body has the pose B J(q)^-1 A^-1.
 
 Lengths are multiplied by `metersPerUnit`. Angles are converted from degrees. If y is up, the robot is
@@ -67,13 +67,13 @@ from urdfkin.urdf.sources import USD_SUFFIXES
 _MAX_LAYERS = 1_000
 #: In USD, this limit or infinity means no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
-#: A frame has shear if |cosine of two axes| > `_MAX_SHEAR` u n.
+#: Shear means |cosine of two axes| > `_MAX_SHEAR` u n.
 #: u is `SINGLE_ROUNDOFF`. The path of the prim has n prims.
-#: A stored rotation matrix has entries with errors up to u.
-#: A product in single precision adds errors up to 3 u.
-#: The cosine of two columns changes by 2 sqrt(3) 4 u < 14 u.
-#: A stored unit quaternion has a length error up to u.
-#: This error changes the cosine by up to 4 u.
+#: Error of a stored matrix entry: up to u.
+#: Additional error of a product in single precision: 3 u.
+#: Error of the cosine: 2 sqrt(3) (u + 3 u) < 14 u.
+#: Length error of a stored unit quaternion: up to u.
+#: The cosine changes by up to 4 u.
 _MAX_SHEAR = 14.0
 #: Rule USD303 checks only limits above this angle (degrees).
 #: A revolute joint with smaller limits hardly moves.
