@@ -28,8 +28,7 @@ def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
     """Return a command that runs code in a new interpreter.
 
     The new interpreter imports from the absolute paths in `sys.path`. Dask's temporary folder is excluded.
-    The folder with the package urdfkin is added. Only an absolute path, for example in PYTHONPATH, makes the
-    current folder one of these folders.
+    The folder with the package urdfkin is added. The current folder is not added.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_import_path()!r}; {code}"]
 

@@ -445,7 +445,8 @@ MAX_NAME_SEARCHES = 20
 #: Maximum number of compared pairs of characters in one search.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: Minimum number of warnings or notes that `fold` combines.
+#: `fold` combines warnings or notes of one code.
+#: `MIN_FOLDED` is the minimum number of findings.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
 #: These codes are about inertials, shapes and materials.
 #: Kinematics does not use these elements.

@@ -14,8 +14,8 @@ MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
 
 `Mjcf.remarks` names the parts that a tree cannot represent, for example tendons.
 
-The options `align` and `alignfree` are about free bodies. MuJoCo then aligns the body frame with the inertial
-frame. The inertial frame depends on the shapes. With these options, MuJoCo therefore needs the meshes.
+MuJoCo can align the frame of a free body with the inertial frame. The options are `align` and `alignfree`.
+The inertial frame depends on the shapes. With these options, MuJoCo therefore needs the meshes.
 """
 
 from __future__ import annotations
@@ -534,9 +534,9 @@ class _MjcfReader:
             self._add_fixed_joint(T, here, link)
 
     def _make_joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return MuJoCo's joint `j`, and the body pose in the joint frame.
+        """Convert MuJoCo's joint `j`. Also return the body pose in the joint frame.
 
-        T is the pose of the joint frame in the parent link. T is valid if the joint value is `ref`.
+        T is the pose of the joint frame in the parent link. T holds for the joint value `ref`.
         """
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])

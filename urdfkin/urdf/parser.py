@@ -60,7 +60,7 @@ XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16.
-#: UTF-16's byte order mark is a prefix of UTF-32's.
+#: The little-endian mark of UTF-16 is a prefix of UTF-32's.
 #: Therefore, UTF-32 comes first.
 _WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),

@@ -71,7 +71,7 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: u is `SINGLE_ROUNDOFF`. The path of the prim has n prims.
 #: Error of a stored matrix entry: up to u.
 #: Additional error of a product in single precision: 3 u.
-#: Error of the cosine: 2 sqrt(3) (u + 3 u) < 14 u.
+#: Error of the cosine per prim: 2 sqrt(3) (u + 3 u) < 14 u.
 #: Length error of a stored unit quaternion: up to u.
 #: The cosine changes by up to 4 u.
 _MAX_SHEAR = 14.0
@@ -371,7 +371,7 @@ class _JointPrim:
     """A joint prim.
 
     Attributes:
-        name: The name of the prim, then the unique name in the tree.
+        name: Initially the prim's name, later the unique name in the tree.
         ends: The paths of the two connected bodies. None is the world.
         frames: The poses of the joint frame in the two bodies.
         rounding: Bounds on single-precision errors of the joint frame: position (m), orientation (rad).

@@ -29,7 +29,7 @@ from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
 from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum size (bytes) of a searched file, and maximum number.
+#: Maximum size (bytes) and number of searched files.
 MAX_SEARCHED_BYTES, MAX_SEARCHED_FILES = 10_000_000, 200
 
 #: Function that returns a package's folder, or raises LookupError.

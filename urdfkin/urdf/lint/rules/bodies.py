@@ -24,7 +24,7 @@ MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 NEGLIGIBLE_MASS = 1e-3
 
 #: Tolerance of a principal moment, divided by the mass (m^2).
-#: A radius of gyration of 0.03 mm has this tolerance.
+#: A radius of gyration of 0.03 mm gives this value.
 NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of moments: exporters write few digits.

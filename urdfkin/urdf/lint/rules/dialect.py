@@ -95,7 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: The pair (element, attribute name). The element itself has None.
+#: (element, attribute name), or (element, None) for the element itself.
 _ElementOrAttribute = tuple[Element, str | None]
 
 
