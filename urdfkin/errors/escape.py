@@ -95,7 +95,7 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def json_text(data: Any) -> str:
     r"""Return data as JSON text in ASCII.
 
-    A CI service can interpret text such as `##[error]` as a command. To prevent this, the function escapes
+    A CI service can interpret text such as `##[error]` as a command. Therefore, the function escapes
     the second `#` of each `##`. A JSON parser restores the original text.
 
     >>> print(json_text(["\u202e ##[error]"]))

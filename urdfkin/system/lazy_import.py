@@ -52,7 +52,7 @@ def installed_version(package: str) -> str | None:
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
     # `metadata` is imported late, because `metadata` imports many modules.
-    # At the start, the current folder could replace these modules.
+    # At the start, the current folder could contain such modules.
     from importlib import metadata
 
     try:

@@ -48,7 +48,7 @@ class ImportLock:
     """Lock for imports inside functions of urdfkin, for example in `lazy_import`.
 
     Without this lock, another thread could fork a child process during an import. The child process would
-    then wait for this import for ever. This lock is not Python's import lock.
+    then never finish this import. This lock is not Python's import lock.
 
     A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. During an
     import, a thread may also need the lock of `logging`. Therefore, a fork must acquire the import lock

@@ -23,7 +23,7 @@ from typing import Any
 from urdfkin.urdf.expressions import RefusedError
 
 #: Maximum memory of the process in bytes.
-#: Python and its imported libraries need about a tenth.
+#: Python and libraries need about a tenth of this memory.
 MAX_MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.

@@ -442,17 +442,17 @@ class CommentIndex:
 #: Maximum number of misspelt names with suggestions in a file.
 MAX_NAME_SEARCHES = 20
 #: Maximum number of names in one search for similar names.
-#: Maximum number of compared pairs of characters in one search.
+#: Maximum number of compared character pairs in one search.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
 #: `fold` combines warnings or notes of one code.
 #: `MIN_FOLDED` is the minimum number of findings.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: These codes are about inertials, shapes and materials.
+#: Codes URDF7xx are about inertials, shapes and materials.
 #: Kinematics does not use these elements.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: Maximum number of separate errors of one code with `fold`.
+#: `fold` combines the errors of one code above this number.
 MAX_ERRORS_PER_CODE = 100
 
 #: Maximum number of complete findings with one code and severity.
@@ -485,7 +485,7 @@ class Reporter:
     #: Cache of `_spans` for one element.
     _cached_element: Element | None = None
     _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
-    #: Elements of the findings added before `silence`.
+    #: Elements of findings that precede the call of `silence`.
     #: The keys are the ids of the findings.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 

@@ -523,7 +523,8 @@ class NumberReader:
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
         """Report tabs and line ends between or after numbers.
 
-        Such characters make urdfdom refuse the file. The raw text is read, because expat replaces them.
+        A tab or line end makes urdfdom refuse the file. The raw text is read, because expat replaces tabs and
+        line ends.
         """
         raw_value = self.report.raw_value(element, attribute)
         if raw_value is None or self._is_too_long(

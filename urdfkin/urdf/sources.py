@@ -240,7 +240,7 @@ def _read_stream(stream: IO[str] | IO[bytes], max_bytes: int) -> UrdfText:
     label = os.fsdecode(name) if name and isinstance(name, str | bytes) else "<file>"
     try:
         content: Any = stream.read(max_bytes + 1)
-        # An unbuffered stream may return only a part.
+        # A read from an unbuffered stream may be incomplete.
         while isinstance(stream, io.RawIOBase) and 0 < len(content) <= max_bytes:
             if not (more := stream.read(max_bytes + 1 - len(content))):
                 break

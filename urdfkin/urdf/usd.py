@@ -65,7 +65,7 @@ from urdfkin.urdf.mjcf import (
 from urdfkin.urdf.sources import USD_SUFFIXES
 
 _MAX_LAYERS = 1_000
-#: In USD, this limit or infinity means no limit.
+#: In USD, a limit of this size means no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: Shear means |cosine of two axes| > `_MAX_SHEAR` u n.
 #: u is `SINGLE_ROUNDOFF`. The path of the prim has n prims.
@@ -73,7 +73,7 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: Additional error of a product in single precision: 3 u.
 #: Error of the cosine per prim: 2 sqrt(3) (u + 3 u) < 14 u.
 #: Length error of a stored unit quaternion: up to u.
-#: The cosine changes by up to 4 u.
+#: Effect of this length error on the cosine: 4 u.
 _MAX_SHEAR = 14.0
 #: Rule USD303 checks only limits above this angle (degrees).
 #: A revolute joint with smaller limits hardly moves.
@@ -557,7 +557,7 @@ class _StageReader:
             scale = -scale
         R = M[:3, :3] / scale
         if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
-            message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
+            message = "the frame of a prim has shear, but a rigid body has none"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
             raise InputError(message, where=where, found=self._describe_uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
@@ -659,7 +659,7 @@ class _StageReader:
             length_A + length_B,
             (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
         )
-        # A body None is the world: A and B then use z up.
+        # Without a body, A or B is in z-up coordinates.
         # `UsdJoint` uses the stage's world, where y can be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
@@ -713,8 +713,8 @@ class _StageReader:
         """Return bounds on a prim's single-precision errors in position (m) and orientation (rad).
 
         The pose is relative to `body`. A chain of translations leads from the body to the prim.
-        `translation_length_sum` (m) is the sum of their lengths. A rotation error of a prim also displaces
-        all prims below the prim. Transforms in half precision are ignored.
+        `translation_length_sum` (m) is the sum of the translation lengths. A rotation error of a prim also
+        displaces all prims below the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -1017,7 +1017,7 @@ class _StageReader:
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
             raise InputError(
-                "body0 must be the world for a floating joint, and the parent body for a planar joint",
+                "a floating joint needs the world as body0, and a planar joint the parent body",
                 where=f"{self.source}: joint {edge.path}",
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
@@ -1034,8 +1034,8 @@ class _StageReader:
             return
         # In URDF, joint and child link have the same frame.
         # In USD, these frames can differ.
-        # The joint then moves an additional link.
-        # A fixed joint connects this link with the child link.
+        # If the frames differ, the joint moves an additional link.
+        # A fixed joint connects the additional link and child link.
         between = make_unique(f"{name}_link", self._used_link_names)
         yield joint, here, between
         yield (
@@ -1052,7 +1052,7 @@ class _StageReader:
         rate = rate * self._factor(edge.kind) if 0.0 < rate < _LARGEST_SINGLE else math.inf
         if edge.kind is JointKind.CONTINUOUS:
             if math.isfinite(lower) or math.isfinite(upper):
-                what = "the joint has only one limit; a URDF joint has two or none, so the limit is ignored"
+                what = "the only limit of the joint is ignored: a URDF joint has two limits or none"
                 self._report("unused-in-usd", edge.path, what)
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
@@ -1166,7 +1166,7 @@ class _StageReader:
     def _compare_units(self, edge: _JointPrim, mimicked_joint: str) -> None:
         kind = next((one.kind for one in self._edges if one.path == mimicked_joint), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
-            what = "USD defines no unit for mimic rules between an angle and a length; urdfkin uses m and rad"
+            what = "USD defines no unit for mimic rules between angle and length; urdfkin uses m and rad"
             self._report("lost-mimic", edge.path, what, "compare the joint with the simulator")
 
     # -- the whole stage -----------------------------------------------------------------------------

@@ -30,7 +30,7 @@ def as_sarif(
 ) -> str:
     """Return a SARIF document: all URDF rules, and a result for each finding.
 
-    Other rules are included only if a finding has their code. `files_with_mark` contains the files
+    MJCF and USD rules are included only if findings have their codes. `files_with_mark` contains the files
     that begin with a byte order mark. In SARIF, a byte offset of a fix counts this mark.
     """
     codes = {finding.code for finding in findings}

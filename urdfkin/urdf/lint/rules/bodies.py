@@ -20,11 +20,11 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
 #: A smaller nonzero mass (kg) is probably a placeholder.
-#: The moments of inertia are then not checked.
+#: For a smaller mass, moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
 #: Tolerance of a principal moment, divided by the mass (m^2).
-#: A radius of gyration of 0.03 mm gives this value.
+#: The value follows from a gyration radius of 0.03 mm.
 NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of moments: exporters write few digits.

@@ -140,7 +140,7 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller errors of an axis length are only notes.
+#: A smaller error of an axis length is only a note.
 #: An axis with few digits has such an error.
 NOTE_LENGTH_ERROR = 2e-4
 
@@ -418,14 +418,13 @@ class _MimicChecker:
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
             message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
-            both = mimicked_joint.kind == "continuous"  # Pinocchio also refuses if only the latter is.
+            # Pinocchio also refuses a revolute mimic of a continuous joint.
+            both = mimicked_joint.kind == "continuous"
             remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = (
-                "name a joint that is not a mimic joint; some readers apply only one mimic rule of a chain"
-            )
+            remedy = "name a joint that is not a mimic joint; some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
@@ -533,8 +532,8 @@ SUSPICIOUS_LENGTH = 100.0
 #: The lengths of a smaller robot were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
-#: Whole-number limits between these two numbers are probably degrees.
-#: Some exporters write larger limits for joints without limits.
+#: Whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
+#: Some exporters write larger placeholders for joints without limits.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
 #: Displacement (m) above which a rounded angle is a warning.
