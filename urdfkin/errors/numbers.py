@@ -130,7 +130,7 @@ def _product(factors: str) -> float | None:
 def radians_from_degrees(degrees: float) -> float:
     """Convert degrees to radians.
 
-    15 k degrees become exactly k * pi / 12 in floating point.
+    For k * 15 degrees, the result is the double `k * pi / 12`.
     """
     twelfths = degrees / 15.0
     return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(degrees)

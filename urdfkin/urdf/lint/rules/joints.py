@@ -140,7 +140,7 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: A smaller error of an axis length is only a note.
+#: A smaller error of an axis length is a note.
 #: An axis with few digits has such an error.
 NOTE_LENGTH_ERROR = 2e-4
 
