@@ -6,13 +6,14 @@ The product of exponentials defines the pose of a link:
 
 The unit screws S_i describe the joint axes in the zero configuration. H is the link's pose in the zero
 configuration. All S_i and H use one common frame. The constant poses between the joints are not factors of
-this product. Merging fixed links into one link does not change the product. Any body may be the root. A path
-from the root can cross a joint from child to parent. The screw of such a joint is reversed.
+this product. Merging links that are fixed to each other does not change the product. Any body may be the
+root. A path from the root can cross a joint from child to parent. The screw of such a joint is reversed.
 
-**Planar and floating joints.** The coordinates of such a joint describe a pose P. The models A and B may use
-different joint frames. The constant rigid motion M converts between the joint frames. A and B may also use
-different frames of the next body. The constant rigid motion N converts between the body frames. A and B move
-in the same way if:
+Planar and floating joints:
+
+The coordinates of such a joint describe a pose P. The models A and B may use different joint frames. The
+constant rigid motion M converts between the joint frames. A and B may also use different frames of the next
+body. The constant rigid motion N converts between the body frames. A and B move in the same way if:
 
 `P_b = M P_a N`.
 
@@ -20,14 +21,14 @@ If one model reverses the joint, P_a^-1 replaces P_a.
 
 For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses. Planar poses
 are translations and rotations in the joint's plane. Therefore, M P N must be planar for every planar pose P.
-If M raises the plane by h, N must lower it by h. If M turns the plane over, N must also turn the plane
-over.
+If M raises the plane by h, N must lower it by h. If M turns the plane over, N must also turn the plane over.
 
-**Alignment.** The matcher starts at two corresponding bodies of A and B. A and B are in the zero
-configuration. The rigid motion G moves A's body to the corresponding body of B. A joint of A has the screw S
-and the value t. The joint moves the later bodies by exp(S t). The matched joint of B moves the corresponding
-bodies by exp(S' t'). S' and t' use the positive direction and the zero of A's joint. A difference between the
-joints has one of these effects:
+Alignment:
+
+The matcher starts at two corresponding bodies of A and B. A and B are in the zero configuration. The rigid
+motion G moves A's body to the corresponding body of B. A joint of A has the screw S and the value t. The
+joint moves the later bodies by exp(S t). The matched joint of B moves the corresponding bodies by exp(S' t').
+S' and t' use the positive direction and the zero of A's joint. The displaced parts of B determine the effect:
 
 | displaced parts of B | effect |
 |---|---|
@@ -48,10 +49,12 @@ Models that agree at all joints and links have the same motion. Models that diff
 have different motions. There are exceptions. For example, two consecutive revolute joints may rotate about
 the same line. The later links then depend only on the sum of the angles.
 
-**Variables.** Each joint value is a function `slope * variable + constant`. Each coordinate of A is a
-variable. Most coordinates of B are functions of these variables. The joint's sign and zero offset determine
-`slope` and `constant`. The remaining coordinates of B are additional variables. An example is B's moving
-joint that is matched with a fixed joint.
+Variables:
+
+Each joint value is a function `slope * variable + constant`. Each coordinate of A is a variable. Most
+coordinates of B are functions of these variables. The joint's sign and zero offset determine `slope` and
+`constant`. The remaining coordinates of B are additional variables. An example is B's moving joint that is
+matched with a fixed joint.
 """
 
 from __future__ import annotations
