@@ -41,7 +41,7 @@ The link poses of A and B are:
 `T_A = exp(S_1 t_1) ... exp(S_n t_n) H`
 `T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H`.
 
-Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i:
+Each L is expressed in A's root frame in the zero configuration. If A and B agree at joint i:
 
 `S'_i = S_i, t'_i = t_i, L_i = 1`.
 

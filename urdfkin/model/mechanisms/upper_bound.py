@@ -19,8 +19,8 @@ For unit vectors u, the maximum of h(u) is the largest |p|. A motion of W change
 The program computes h joint by joint along the chain. The computation needs no search over joint values.
 
 The program stores h(u) at grid points on the surface of a cube. The function h is convex. For s >= 0, h(s u)
-is s h(u). Therefore, interpolation between grid points gives an upper bound. If R covers the range of a
-joint, the vectors R^T u form an arc. The program encloses the arc in a polygon. A convex function is largest
+is s h(u). Therefore, interpolation between grid points gives an upper bound. If R covers a joint's range, the
+vectors R^T u form an arc. The program encloses the arc in a polygon. A convex function is largest
 at a corner of a polygon. At each joint, the interpolated h can be larger than the true h. The relative error
 is proportional to the square of the grid spacing.
 
