@@ -268,8 +268,8 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # Backwards, a rotation to the joint's axis precedes the joint's motion.
-            # The joint's constant pose follows the motion as one more pose.
+            # Backwards, a rotation to the axis precedes the joint's motion.
+            # The constant pose follows the motion as one more pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

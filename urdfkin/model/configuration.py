@@ -48,7 +48,7 @@ from urdfkin.model.tree import (
 
 #: Largest |value| (rad or m) in `sample` of one-coordinate joints.
 #: If limits exclude all these values, `sample` draws larger values.
-#: For joints without limits, some bounds assume |q| <= `ASSUMED_LIMIT` (m).
+#: Without limits, some bounds assume |q| <= `ASSUMED_LIMIT` (m).
 #: Few linear axes of robots are longer than 10 m.
 ASSUMED_LIMIT = 10.0
 #: Text of the condition under which an upper bound holds.
@@ -607,7 +607,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Positions of free joints in `sample` are in [-2, 2] m.
+#: Positions of free joints in `sample`: [-2, 2] m.
 _MAX_SAMPLED_POSITION = 2.0
 
 

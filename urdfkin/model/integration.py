@@ -58,8 +58,8 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the velocities that lead to `end` in one second.
 
-    Continuous, planar and floating joints rotate by at most half a turn. If a full turn moves a mimic joint,
-    a continuous joint makes the full rotation.
+    Continuous, planar and floating joints rotate by at most half a turn. A full turn of a continuous joint
+    can move a mimic joint. The continuous joint then makes the full rotation.
     """
     shape = common_batch_shape((start.shape[:-1], end.shape[:-1]))
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))

@@ -1,8 +1,8 @@
 """The robot model: a tree of links and joints, with limits and mimic rules.
 
 `KinematicTree` depends neither on XML nor on Pinocchio. The links and joints are in Pinocchio's order. The
-order is depth first, and sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in
-Pinocchio. A frame has the name of its link or joint. A link and a joint can have the same name.
+order is depth first, with sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and
+in Pinocchio. A frame has the name of its link or joint. A link and a joint can have the same name.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class Limit:
 #: Largest plausible |joint angle| (rad).
 #: Some industrial wrists turn 400 degrees in each direction.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A joint value beyond these margins is far outside the limits.
+#: Joint values beyond these margins are far outside the limits.
 #: margin = max(`_MARGIN` (rad or m), `_MARGIN_FRACTION` * range).
 #: With only one limit, the margin is 0.
 _MARGIN, _MARGIN_FRACTION = 0.5, 0.25

@@ -316,7 +316,7 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 
 #: Axes are nearly parallel if sin(angle) is below this value.
 #: An error of one axis moves the axes' nearest points.
-#: Parallel axes can magnify the error more than 100 times.
+#: Nearly parallel axes can magnify the error over 100 times.
 _NEARLY_PARALLEL_SINE = 1e-2
 
 
@@ -352,7 +352,7 @@ def later_axes(
 
 #: Maximum number of Gauss-Newton steps; two steps are usually enough.
 #: Axes with angles up to 1e-8 rad need more steps.
-#: Then a single step can change an angle by 1 rad.
+#: Then one step can change an angle by 1 rad.
 _REFINEMENT_STEPS = 10
 #: The fit stops after a smaller step (rad and m).
 _NEGLIGIBLE_CHANGE = 1e-14
@@ -400,7 +400,7 @@ def _errors(
     edges = {edge.joint: edge for edge in b.edges}
     root = b.body_of[alignment.base[1]], X, np.eye(6, 6 + n)
     # B's bodies after each joint pair, with the bodies' motions.
-    # Item 3 contains derivatives (6, 6 + n) of a twist.
+    # The arrays (6, 6 + n) are twist derivatives.
     after = list[tuple[int, FloatArray, FloatArray]]()
     errors, derivatives = list[FloatArray](), list[FloatArray]()
     for i, step in enumerate(alignment.steps):
