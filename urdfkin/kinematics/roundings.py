@@ -253,7 +253,7 @@ MIN_DIVISOR = 1e-300
 #: Allowed difference between urdfkin and Pinocchio, without tilts:
 #:     `joints * factors * PINOCCHIO_ROUNDINGS * eps * scale`
 #: `joints` = number of joints of the path + 1.
-#: For a rotated base, `joints` is one larger.
+#: For a rotated base: number of joints + 2.
 #: `factors` is the number of factors of a term.
 #: Example: w x (w x d) has three factors.
 #: The docstring above derives these rules.
@@ -344,8 +344,8 @@ ROTATION_ROUNDINGS = 8.0
 #: The computation has a subtraction and a division.
 #: The mimic rule has a multiplication and an addition.
 #: The error of each operation is 0.5, the sum 2.0.
-#: Both ends of the mimicked joint's range move inwards.
-#: The ends move by 4.0, twice the sum.
+#: The mimicked joint's range is narrowed at its ends.
+#: The narrowing at each end is 4.0, twice the sum.
 #: Therefore, the mimic joint's limits accept the narrowed range.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
@@ -385,8 +385,8 @@ def written_urdf_roundings(rows: int) -> float:
 
 
 def fitted_table_roundings(rows: int) -> float:
-    """Return the allowed difference (eps) between a URDF and its fitted table.
+    """Return the allowed pose difference (eps) between a URDF and its fitted table.
 
-    The difference is a difference of poses. After the fit, it is at most 12.5 * table_roundings(rows).
+    After the fit, the difference is at most 12.5 * table_roundings(rows).
     """
     return 12.5 * table_roundings(rows)

@@ -1,11 +1,11 @@
 """A path between two frames as a sequence of joint axes.
 
-The symbols are those of section 7.5 of the textbook. The axis of joint i is z_{i-1} at O_{i-1}. A revolute
-joint rotates about z_{i-1}, and a prismatic joint translates along z_{i-1}. The vector d_{i-1,i} leads from
-O_{i-1} to O_i. The path may lead upwards, downwards, or through a common ancestor. An example is the path
-from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes a
-joint from child to parent, the joint's axis is reversed. The coordinate q then keeps the sign of the URDF.
-The reason is that the inverse of Rz(q) rotates by q about -z.
+The symbols are from section 7.5 of the textbook. The axis of joint i is z_{i-1} at O_{i-1}. A revolute joint
+rotates about z_{i-1}, and a prismatic joint translates along z_{i-1}. The vector d_{i-1,i} leads from O_{i-1}
+to O_i. The path may lead upwards, downwards, or through a common ancestor. An example is the path from the
+left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes a joint from
+child to parent, the joint's axis is reversed. The coordinate q then keeps the sign of the URDF. The reason is
+that the inverse of Rz(q) rotates by q about -z.
 """
 
 from __future__ import annotations

@@ -354,7 +354,7 @@ def later_axes(
 #: Axes with angles up to 1e-8 rad need more steps.
 #: Then one step can change an angle by 1 rad.
 _REFINEMENT_STEPS = 10
-#: The fit stops after a smaller step (rad and m).
+#: The fit stops if |step| (rad, m) is below this value.
 _NEGLIGIBLE_CHANGE = 1e-14
 
 
@@ -577,7 +577,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None)
 
 #: Function that proposes poses of B's next body.
 #: Argument 1: the next bodies of A and B.
-#: Argument 2: the joints before these bodies.
+#: Argument 2: the joints before the next bodies.
 #: Argument 3: the pose (4, 4) of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 

@@ -55,13 +55,13 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 #: Maximum tree depth (joints) for the exact, recursive search.
 MAX_EXACT_SEARCH_DEPTH = 200
 #: Maximum number of later joints per branch in a comparison.
-#: Such comparisons decide between equally good choices.
+#: Comparisons of later joints decide between equally good choices.
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of root poses that the exact search computes.
 #: The maximum applies to each pair of start bodies.
 MAX_ROOT_POSES = 48
 #: A score is better if `difference < BETTER_RATIO * other_difference`.
-#: This rule applies to scores with equal counts.
+#: The rule applies to scores with equal counts.
 BETTER_RATIO = 0.5
 
 #: Zero offset (rad or m) or pose (4, 4).
@@ -74,7 +74,7 @@ Score = tuple[int, float]
 class LookAhead:
     """A limit on the number of later joint pairs in comparisons.
 
-    Such comparisons decide between equally good choices. Several matchers can share a limit.
+    The comparisons decide between equally good choices. Several matchers can share a limit.
     """
 
     remaining: int
@@ -90,7 +90,7 @@ class BodyPair:
 
     Attributes:
         via: The joints before the bodies. None at the start of the search.
-        previous: Index of these joints in `Alignment.steps`, or -1.
+        previous: Index of the joints `via` in `Alignment.steps`, or -1.
         motion_a: (4, 4) product of the motions L at earlier joints.
         motion_b: (4, 4) product of the root pose, earlier zero offsets and earlier conversions.
     """
@@ -150,7 +150,7 @@ class MechanismMatcher:
     def find_best_with_names(self) -> Alignment:
         """Return the best alignment that separates no links with equal labels.
 
-        If each alignment separates such links, return one of these alignments.
+        If every alignment separates links, return an arbitrary alignment.
         """
         best: Alignment | None = None
         self.exact = None
@@ -826,7 +826,7 @@ def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Exchange the partners of two joint pairs if the alignment improves.
 
-    Mirrored arms can need such an exchange.
+    Example: the robot has mirrored arms.
     """
     # An exchange cannot match joints that only one model has.
     if best.only_a or best.only_b:

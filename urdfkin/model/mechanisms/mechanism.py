@@ -7,13 +7,14 @@ The product of exponentials defines the pose of a link:
 The unit screws S_i describe the joint axes in the zero configuration. H is the link's pose in the zero
 configuration. All S_i and H use one common frame. The constant poses between the joints are not factors of
 this product. Merging links that are fixed to each other does not change the product. Any body may be the
-root. A path from the root can cross a joint from child to parent. The screw of such a joint is reversed.
+root. A path from the root can cross a joint from child to parent. The joint's screw is then reversed.
 
 Planar and floating joints:
 
-The coordinates of such a joint describe a pose P. The models A and B may use different joint frames. The
-constant rigid motion M converts between the joint frames. A and B may also use different frames of the next
-body. The constant rigid motion N converts between the body frames. A and B move in the same way if:
+The coordinates of a planar or floating joint describe a pose P. The models A and B may use different joint
+frames. The constant rigid motion M converts between the joint frames. A and B may also use different frames
+of the next body. The constant rigid motion N converts between the body frames. A and B move in the same way
+if:
 
 `P_b = M P_a N`.
 
@@ -176,7 +177,7 @@ class FreeJointConversion:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Check that M and N are rigid motions that the joint allows.
+        """Check the rigid motions M and N for a joint kind.
 
         The joint must reach M P N for two test poses P.
         """
@@ -279,7 +280,7 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        separating_joints: Indices of fixed joints in `tree.joints`. These joints move in the other model.
+        separating_joints: Indices (`tree.joints`) of fixed joints with moving partners in the other model.
         labels: Label of each link, by default its name. Links with equal labels are paired.
         free_frames: Whether a convention chooses the link frames. Example: a Denavit-Hartenberg table.
 
@@ -896,7 +897,7 @@ class _VariablesBuilder:
         """Return whether two functions differ by rounding only.
 
         Let e be the rounding error of one joint. The slopes may differ by e. The constants may differ by
-        `depth * e`. The reason is that poses of several joints determine a zero offset.
+        `depth * e`. Poses of several joints determine a zero offset.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)

@@ -622,7 +622,7 @@ def _derivative_supports(
 
 
 def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _SupportPair:
-    """Return upper bounds on the support functions of these derivatives.
+    """Return upper bounds on the support functions of d_i and y_i.
 
     `d_i = u x d + (u' - u) x (y - o') + u x (o - o')`
     `y_i = u' x (y - o')`.
@@ -657,7 +657,7 @@ def relevant_joints(
     """Return the matched joints that affect |D|, and their values.
 
     The result begins at the first joint that differs. An earlier joint can share a variable with the result.
-    The result then begins at this earlier joint.
+    The result then begins at the earlier joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),
