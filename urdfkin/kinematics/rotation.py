@@ -221,7 +221,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
     Shepperd's method avoids cancellation.
     """
     R = as_rotations(R, "R")
-    # Rows of K = 4 q q^T are multiples of q.
+    # The rows of `K = 4 q q^T` are multiples of q.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace

@@ -57,8 +57,8 @@ MAX_EXACT_SEARCH_DEPTH = 200
 #: Maximum number of later joints per branch in a comparison.
 #: Comparisons of later joints decide between equally good choices.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of root poses that the exact search computes.
-#: The maximum applies to each pair of start bodies.
+#: Maximum number of root poses that axes give the exact search.
+#: The maximum applies to each pair of bodies.
 MAX_ROOT_POSES = 48
 #: A score is better if `difference < BETTER_RATIO * other_difference`.
 #: The rule applies to scores with equal counts.
