@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-#: Value of a joint: one number, or several numbers for a planar or floating joint.
+#: Value of a joint: one number; 3 (planar) or 7 (floating).
 JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
@@ -120,7 +120,8 @@ def read_pinocchio(source: str) -> LibraryModel:
     slots: dict[str, tuple[int, int]] = {}
     # In Pinocchio, joint 0 is the world.
     for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        # In Pinocchio, several MJCF joints of one body are one joint, with the name of the first joint.
+        # Pinocchio combines several MJCF joints of one body into a composite joint.
+        # The composite joint has the first joint's name.
         group = groups.get(name.removeprefix("Composite_"), []) if name.startswith("Composite_") else []
         if len(group) == joint.nq > 1:
             slots |= {part: (joint.idx_q + i, 1) for i, part in enumerate(group)}
@@ -174,7 +175,7 @@ def read_mujoco(source: str) -> LibraryModel:
         warnings.simplefilter("ignore")
         model = (mujoco.MjModel.from_xml_path if _is_path(source) else mujoco.MjModel.from_xml_string)(source)
     data = mujoco.MjData(model)
-    # Like urdfkin, the adapter names an MJCF body or joint without a name by its number.
+    # Unnamed MJCF bodies and joints have urdfkin's names, such as `joint3`.
     names = [model.joint(i).name or f"joint{i}" for i in range(model.njnt)]
 
     def compute_poses(values: Mapping[str, JointValue]) -> Poses:
@@ -490,7 +491,8 @@ def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[s
 def main() -> None:
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    # Standard output receives only the results; text that a library prints goes to standard error.
+    # Standard output is only for the results.
+    # Printed text of the libraries goes to standard error.
     output = os.dup(1)
     os.dup2(2, 1)
     for line in _evaluate_cases(sys.argv[1], json.load(sys.stdin)):

@@ -73,10 +73,11 @@ from urdfkin.model.tree import FloatArray
 
 VERIFY_KERNELS_MODULE = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
-#: First indices of position, velocities and accelerations in the state of a moving base.
+#: Indices in a base's state: position, two velocities, two accelerations.
 _BASE_VECTOR_STARTS = 9, 12, 15, 18, 21
 #: Number of configurations per block of the kernel `lengths`.
-#: The five bounds of one link need 2.5 kB, so the bounds of several links fit into the L1 cache.
+#: The five bounds of one link need 2.5 kB.
+#: The bounds of several links fit into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
@@ -146,7 +147,8 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """The bits equal those of `_fill_without_kernel`."""
     joints = lengths.joints
-    # A stride of 0 means that all configurations share one row. The kernel receives only this row.
+    # Stride 0: all configurations share one row.
+    # The kernel receives only the shared row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -231,7 +233,7 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: Number of translations and number of rotations of a planar joint and of a floating joint.
+#: (number of translations, number of rotations) of a joint.
 _TRANSLATION_ROTATION_COUNTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
@@ -274,7 +276,8 @@ def _propagate_state(joint: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: 
 
 _LOCAL_WORLD_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles becomes inf. The comparison accepts no result with an infinite scale.
+#: A scale can overflow to inf.
+#: A comparison accepts no result with an infinite scale.
 _allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -538,7 +541,7 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Number of cross products with which Pinocchio computes the linear rows of dJ_i/dq_j.
+#: Number of cross products in the linear rows of Pinocchio's dJ_i/dq_j.
 #: The joints on the path are numbered from the root.
 #:
 #: | | Two revolute joints, z x (z x d) | A revolute and a prismatic joint, z x z |
@@ -632,7 +635,8 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
     """
     s = axis_sine - EPS * magnitudes.roundings
     # Now, s is a lower bound on |e_i x t|.
-    # For s = 0, the scale is infinite, and the comparison accepts no result.
+    # s = 0 gives an infinite scale.
+    # A comparison accepts no result with an infinite scale.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
@@ -696,7 +700,7 @@ def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
-        # The array is stored only when it is complete, because other threads may read the cache.
+        # Other threads may read the cache, so a stored array is complete.
         plan.cache["column weights"] = weights
     return weights[0], weights[1]
 

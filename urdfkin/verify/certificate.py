@@ -326,5 +326,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # The counts are not copied, because the copy may be used in another process.
+        # A copy may run in another process, so its counts begin at 0.
         return type(self), ()

@@ -56,10 +56,10 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 #: Number of random configurations. `check_model_source` also compares the neutral configuration.
 _SAMPLE_COUNT = 8
-#: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
-#: The error of each program is less than 8 eps.
-#: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
-#: Quaternions need a square root, a quotient and products of two numbers.
+#: Upper bound of two rounding errors in `check_orientations`, in eps.
+#: Each program's rounding error is less than 8 eps.
+#: Angles need arctan2, sines, cosines and products of three numbers.
+#: Quaternions need a square root, a quotient and products.
 _ORIENTATION_ROUNDINGS = 16.0
 
 
@@ -95,7 +95,7 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
         if not joint.backwards and not joint.kind.turns:
             expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
     differences = np.abs(ours - expected)[:, :, :3]
-    # NaN is a disagreement: `np.maximum` returns NaN, and the comparison NaN <= 1 is False.
+    # NaN is a disagreement: NaN <= 1 is False.
     metres = differences[..., 3].max(initial=0.0)
     direction = np.maximum(differences[..., 2].max(initial=0.0), differences[:, -1, :, :3].max(initial=0.0))
     ends = [i for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
@@ -139,8 +139,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     coordinate_sum = np.abs(coordinates).sum(axis=-1)
     differences = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     chain = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the placements of the base and the tip relative to the root.
-    # The product of exponentials is the placement of the tip relative to the base.
+    # Pinocchio's placements are relative to the root.
+    # The product of exponentials is relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + chain.reach + float(chain.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (chain.base, chain.tip))
     rounding = EPS * (joint_roundings(joints) + coordinate_sum) + sum_zeroed_tilts(chain)
@@ -219,7 +219,7 @@ def check_model_source(verifier: Verifier, converted: ConvertedModel, source: An
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _compute_model_placements(model, _convert_configurations(model, tree, q), converted)
-    # The factor 2 allows for rounded angles in the URDF text.
+    # The URDF text has rounded angles, so the factor is 2.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -273,12 +273,13 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     differences = np.abs(theirs - table.placement(own))[:, :3]
-    # The table's base and tool may have rotations with six digits, but the URDF contains exact rotations.
-    # The bound therefore includes the orthogonality error of the table's rotations.
+    # The table's base and tool may have rotations with six digits.
+    # The URDF contains exact rotations.
+    # The bound therefore includes `_orthogonality_defect`.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * written_urdf_roundings(rows) + defect
     allowed = metres * (written_urdf_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
-    # A comparison with NaN is False, so NaN is a disagreement.
+    # NaN is a disagreement: NaN <= x is False.
     if not ((differences[..., 3].max(axis=-1) <= allowed).all() and (differences[..., :3] <= turn).all()):
         raise TableError(
             "the URDF made from a table differs from the table",

@@ -32,7 +32,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMA
 
 _INFINITY_BITS = 0x7FF0000000000000
 _MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
+#: While comparing row i, the kernel prefetches row i + _PREFETCH_DISTANCE.
 _PREFETCH_DISTANCE = 4
 
 
@@ -174,7 +174,7 @@ def coupling(full, columns, index, factor, out):
 
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
 #: Number of bounds per link: p, w, vel, alpha and acc.
-#: `free` also has five numbers for each planar or floating joint (`urdfkin.verify.bounds._free_lengths`).
+#: Each joint in `free` has five numbers (`urdfkin.verify.bounds._free_lengths`).
 _STATE_SIZE = _FREE_SIZE = 5
 
 
@@ -200,7 +200,7 @@ _LENGTHS = {
     "rotate": _ignore_rotation,
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
-# Numba can call functions that are attributes of a module.
+# Numba accepts functions that are attributes of a module.
 _EQUATIONS: Any = ModuleType("length_equations")
 vars(_EQUATIONS).update(vars(bind_equations(decorate=inline_function(), **_LENGTHS)))
 _STEPS = rebind_functions(steps, decorate=inline_function(), replacements={"eq": _EQUATIONS})

@@ -48,8 +48,8 @@ from urdfkin.verify.pinocchio import tree_depth
 #: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
 #: Maximum number of joints on a path.
-#: MuJoCo's loading time grows with the square of the number of links.
-#: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
+#: MuJoCo's loading time grows with (number of links)^2.
+#: MuJoCo's own limit (1,023 links) applies only after loading.
 _MAX_DEPTH = 1_000
 #: MuJoCo's joints for a planar or floating joint, in coordinate order.
 _REPLACEMENT_JOINTS = {
@@ -78,9 +78,9 @@ class _MujocoIndices:
     qpos: int
     qvel: int
     q: int  # -1 for a moving base.
-    v: int  # -1 for a moving base or locked joint.
-    multiplier: float  # Of the mimic rule; 1 without a rule, 0 for a locked joint.
-    offset: float  # Of the mimic rule, or the value of a locked joint.
+    v: int  # -1: a moving base or a locked joint.
+    multiplier: float  # Mimic multiplier; 1: no mimic rule; 0: a locked joint.
+    offset: float  # Mimic offset, or a locked joint's value.
 
 
 class MujocoOracle(Oracle):
@@ -154,7 +154,8 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if source is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := source.get(name)) is not None})
-        # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
+        # MuJoCo requires limits of a prismatic joint.
+        # MuJoCo's kinematics ignores the limits.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element
@@ -200,7 +201,7 @@ class MujocoOracle(Oracle):
         poses, velocity, acceleration = self._compute_motion(x, 3)
         if not Reference.of(x.reference).at_world:
             return _change_reference(x.reference, poses, acceleration)
-        # Only a spatial acceleration can be shifted to the world origin.
+        # `_change_reference` can shift only spatial accelerations to the world origin.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         out, velocity = (
@@ -237,11 +238,11 @@ class MujocoOracle(Oracle):
         poses = self._compute_poses(x, 2, store)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         reference = Reference.of(x.reference)
-        if reference.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
+        if reference.own_axes:  # Rotating axes: dJ/dt has the additional term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _change_reference(reference, poses, rate, columns=True)
-        if reference.at_world:  # The derivative of p x J_angular contains vel x J_angular.
+        if reference.at_world:  # d/dt (p x J_angular) contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -327,7 +328,8 @@ class MujocoOracle(Oracle):
             qacc = (S @ x.a[..., None] + self._compute_velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
         qvel = np.array(np.broadcast_to(qvel, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
+            # The slide joints' velocity is in world axes.
+            # The ball joint's velocity is in the base's axes.
             at, back = self._indices[0].qvel, np.swapaxes(_make_rotation_matrix(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             qvel[:, at : at + 3] = velocity[..., :3]
@@ -385,7 +387,8 @@ def _normalise_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    # If only the root has a mass, the model's centre of mass is exactly the root's origin.
+    # Only the root has a mass.
+    # Therefore, the centre of mass is exactly the root's origin.
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
         mass[:] = 0.0

@@ -106,7 +106,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 
 #: Pairs (nq, nv) of three kinds of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-#: Number nq of a joint in urdfkin. The key is the pair (nq, nv) of the joint in Pinocchio.
+#: urdfkin's nq of a joint, by the joint's (nq, nv) in Pinocchio.
 _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
@@ -157,8 +157,7 @@ class PinocchioLayout:
                 _JointIndices(size, *full, *at[rule.mimicked_joint], rule.multiplier, rule.offset)
             )
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`.
-        #: For the base, the factor is 0.
+        #: v_full[i] = _factor[i] * v[_index[i]]; a base has the factor 0.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -167,7 +166,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._collect_arrays(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio can use q (`_same_q`) or v (`_same_v`) without conversion.
+        #: Whether q (`_same_q`) or v (`_same_v`) needs no conversion for Pinocchio.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -221,7 +220,7 @@ class PinocchioLayout:
         return couple_columns(full, self._columns, self._index, self._factor, self.nv)
 
 
-#: Name that Pinocchio gives to the world. The world is the parent of a root joint.
+#: Pinocchio's name for the world, the parent of root joints.
 WORLD = "universe"
 _PREFIX_PATTERN = re.compile(r"(link|joint):(.*)", re.DOTALL)
 
@@ -328,8 +327,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion, scalar last, of the rotation nearest to M (q-method, see the module)."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # Because of rounding, the computed q has small components along the other eigenvectors of K.
-    # If M is a rotation, multiplication by K + I = 4 q q^T removes these components.
+    # The computed q has rounding errors along other eigenvectors of K.
+    # For a rotation M, multiplying by K + I = 4 q q^T removes these errors.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -363,9 +362,9 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Suffixes of coordinate names, by the number of joint velocities: planar joint 3, floating joint 6.
+#: Suffixes of coordinate names. Keys: nv (planar 3, floating 6).
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
-#: Suffixes of velocity names, by the number of joint velocities.
+#: Suffixes of velocity names. Keys: nv.
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 

@@ -42,7 +42,7 @@ from urdfkin.verify.oracle import (
     read_mimic_rules,
 )
 
-#: Tests confirm the definitions of accelerations and J-dot only for Pinocchio 4.
+#: urdfkin's tests confirm Pinocchio's definitions only for this major version.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -108,21 +108,22 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
+#: Stack size per link; the parser of Pinocchio 4.1.0 needs less than 4 kB.
 _STACK_BYTES_PER_LINK = 16_384
-#: In any thread, Pinocchio reads chains with fewer joints without a stack overflow.
+#: A chain with fewer joints causes no stack overflow in any thread.
 _SAFE_DEPTH = 100
 #: Maximum nv of a robot, mimic joints included.
-#: At this limit, Pinocchio 4.1.0 needs 2 GB: its memory is about 64 nv^3 bytes (measured).
+#: Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), here 2 GB.
 MAX_NV = 315
 
-#: A block of results with this number of doubles (128 kB) fits into the processor's cache.
+#: A block of this size (128 kB) fits into the processor's cache.
 _FLOATS_PER_BLOCK = 16384
-#: A function of n that returns the results for the next n configurations.
+#: A call f(n) returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
 
-#: Prefix of link names while Pinocchio reduces a model. XML forbids U+0001, so no URDF name has this prefix.
+#: Prefix of link names in `buildReducedModel`.
+#: XML forbids U+0001, so no URDF name has this prefix.
 _LINK_PREFIX = "\x01"
 
 
@@ -175,7 +176,8 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
+    # `buildReducedModel` confuses a link and a joint with equal names.
+    # Link names therefore get a prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_PREFIX + frame.name
@@ -201,7 +203,8 @@ def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # urdfkin has already checked the text for all known causes, so the cause of this error is unknown.
+        # urdfkin has already checked the text for all known causes.
+        # Therefore, the cause of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -231,7 +234,8 @@ class PinocchioOracle(Oracle):
     def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer as the base. Return the new indices of joints and frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects links with the name of a joint, so all joints and frames get unique names.
+        # `appendModel` rejects a link and a joint with equal names.
+        # All joints and frames therefore get unique names.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -365,7 +369,8 @@ class PinocchioOracle(Oracle):
         """Return the joint Jacobian (n, 6, columns) in WORLD, with mimic joints, without the base."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes for a Jacobian without columns, and returns a vector for one column.
+        # Pinocchio 4.1 crashes for a Jacobian without columns.
+        # For one column, Pinocchio 4.1 returns a vector.
         for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -402,7 +407,7 @@ def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
 
 def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Yield results in blocks of `memory`. Later blocks may overwrite earlier blocks."""
-    # Pinocchio 4.1 crashes the process for a Jacobian without columns.
+    # Pinocchio 4.1 crashes for a Jacobian without columns.
     if 0 in memory.shape:
         yield memory
         return

@@ -37,7 +37,8 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
-#: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
+#: Bound on the relative rounding error of a sum of products.
+#: It covers a few dozen positive numbers.
 _RELATIVE_ROUNDING_ERROR = 256.0 * EPS
 _MAX_PRINTED_SAMPLES = 10
 
@@ -246,7 +247,7 @@ def singular_values(
         defect = _bound_orthogonality_error(U) + _bound_orthogonality_error(Vt.swapaxes(-1, -2))
         lower = s * _bound_below(1.0 - defect)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _bound_above(1.0 + defect)[..., np.newaxis] + residual[..., np.newaxis]
-    # NaN becomes 0 as a lower bound, and inf as an upper bound.
+    # NaN -> 0 in lower bounds, NaN -> inf in upper bounds.
     lower, upper = (
         np.nan_to_num(_bound_below(lower), nan=0.0),
         np.nan_to_num(_bound_above(upper), nan=np.inf, posinf=np.inf),
@@ -264,11 +265,11 @@ def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
 def _bound_norm(E: FloatArray) -> FloatArray:
     """Return an upper bound on the Frobenius norm of each matrix. All numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
+    # A matrix with inf is not scaled; its norm is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
-        # `_RELATIVE_ROUNDING_ERROR` does not cover the sum of many squares.
+        # `_RELATIVE_ROUNDING_ERROR` does not cover sums of many squares.
         norm *= 1.0 + E.shape[-2] * E.shape[-1] * EPS
     return _bound_above(norm)
 

@@ -175,8 +175,8 @@ def _compare_with_bounds(
     ones = np.ones_like(error_scales.reach)
     columns = error_scales.turning + error_scales.sliding
     reach, slides = error_scales.reach[:, None], 1.0 if error_scales.sliding.any() else 0.0
-    #: Each quantity has a pair (scale, snapping) for linear differences, and a pair for angular differences.
-    #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
+    #: Each quantity has two pairs (scale, snapping): linear and angular.
+    #: difference <= scale * (relative rounding error) + snapping
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((error_scales.reach, snap_effect.metres), (ones, snap_effect.turn)),
         "jacobian": (
@@ -289,8 +289,8 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
     table_length = sum_table_lengths(table)
     reach = np.maximum(reach, np.minimum(table_length, MAX_LENGTH_RATIO * reach))
-    # `Joint.pinocchio_tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
-    # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
+    # `Joint.pinocchio_tilt`: angle between urdfkin's and Pinocchio's axis of a joint.
+    # An acceleration term has up to four rotated vectors, hence 4.
     roundings = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * roundings + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)

@@ -41,13 +41,13 @@ from urdfkin.verify.verifier import Verifier
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
 #: Tolerance for the angle (rad) between two frames of a joint.
-#: The unit is the error of a rounding to single precision. `_check_joint` derives this bound.
+#: Unit: SINGLE_ROUNDOFF. Derivation: `_check_joint`.
 _ROTATION_ROUNDINGS = 18.0
-#: Tolerance for the origin of a joint's frame, in the same unit. `_check_joint` derives this bound.
+#: Tolerance for the origin of a joint's frame.
+#: Unit: SINGLE_ROUNDOFF. Derivation: `_check_joint`.
 _ORIGIN_ROUNDINGS = 3.0
-#: A prim's transform consists of operations, such as rotations.
-#: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.
-#: `_compare_prim_poses` derives this bound.
+#: Bound on the angle error (rad) of one transform operation.
+#: Unit: SINGLE_ROUNDOFF. Derivation: `_compare_prim_poses`.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 
@@ -318,7 +318,8 @@ def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple
             f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
             f" by up to {worst[0]:.3g} m"
         )
-        # An error of one body displaces all later bodies, so only the first difference is reported.
+        # An error of one body displaces all later bodies.
+        # Therefore, only the first difference is reported.
         return line, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

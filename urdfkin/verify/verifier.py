@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table, besides zero and limit configurations.
+#: Random configurations in the check of a table.
+#: The check adds zero and limit configurations.
 TABLE_SAMPLES = 40
 
 #: True: check all results of a call. False: check none.
@@ -55,7 +56,7 @@ Verify = bool | Literal["sample"]
 SAMPLE_SIZE = 100
 
 #: Maximum number of values that are compared at once.
-#: This number of values (2 MB) fits into the processor's cache.
+#: These values (2 MB) fit into the processor's cache.
 _MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
 _MAX_CONFIGURATIONS = 4096
@@ -102,7 +103,7 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy has no checked results, and builds its own Pinocchio and MuJoCo models.
+        # A copy has no checked results and no oracles.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -132,7 +133,7 @@ class Verifier:
         )
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        # Pinocchio may accept a robot with fewer moving joints, even if it refuses the original robot.
+        # Pinocchio may refuse the robot but accept the locked robot.
         known_refusal = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -425,7 +426,7 @@ def compute_own_results(quantity: Quantity, x: CallPart) -> FloatArray:
     return quantity.compute_results(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-#: The comparison reports inf and NaN, so NumPy need not warn.
+#: The comparison reports inf and NaN, so NumPy's warnings are redundant.
 _ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 

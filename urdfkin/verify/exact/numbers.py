@@ -30,20 +30,21 @@ from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Number of decimal digits of reference values; long paths need more (`enough_digits`).
-#: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
+#: Digits of reference values; long paths need more (`enough_digits`).
+#: A double has about 16 digits.
+#: Therefore, 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Number of decimal digits of intervals on a path without joints (`enough_digits`).
+#: Digits of intervals on a path without joints (`enough_digits`).
 _BASE_DIGITS = 30
 _BITS_PER_DIGIT = math.log2(10.0)
 #: An interval of 15 digits has 50 + 5 = 55 bits.
-#: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
+#: With 53 bits, its width could be four spacings of doubles.
 _ADDITIONAL_BITS = 5
 #: A decimal of 17 digits determines every double.
 _SIGNIFICANT_DIGITS = 17
-#: Number of digits in `format_decimal` before the result is rounded to 17 digits.
+#: Digits in `format_decimal` before the rounding to 17 digits.
 _INTERMEDIATE_DIGITS = 200
-#: Additional bits of precision for the Newton steps of `nearest_rotation`.
+#: Additional bits of precision for the Newton steps in `nearest_rotation`.
 _NEWTON_BITS = 30
 
 _precision_lock = make_fork_safe_lock()
@@ -75,7 +76,7 @@ def as_interval(value: Number) -> Number:
 
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return both ends, rounded outward to doubles."""
-    # This shortcut saves time, because x is usually the integer 0.
+    # x is usually the integer 0, so this shortcut saves time.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
@@ -223,7 +224,8 @@ def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: Fl
     return _ExactText(text).conversion_errors(tree, path, q)
 
 
-# The last URDF is cached, because parsing a large URDF is slower than computing one sample.
+# Parsing a large URDF is slower than computing one sample.
+# The latest URDF is therefore cached.
 @lru_cache(maxsize=1)
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = INTERVALS) -> None:

@@ -29,8 +29,8 @@ from urdfkin.verify.oracle import BaseMotionLike
 
 _RECURSION = Recursion(equations)
 
-#: Axis and type of each velocity of a planar or floating joint.
-#: A pair contains the index of an axis of the child link (0 for x), and True for an angular velocity.
+#: A pair (axis of the child link, is_angular) for each velocity.
+#: Axes 0, 1, 2 are x, y, z.
 _VELOCITY_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -148,7 +148,7 @@ def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -
 def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # NumPy cannot multiply an interval by an array.
+        # NumPy has no product of an interval and an array.
         out[of, by] += _as_array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
