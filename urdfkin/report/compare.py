@@ -185,13 +185,13 @@ def _units_cell(value: Units | str) -> str:
     return value if isinstance(value, str) else format_units(value)
 
 
-#: Growth of a robot's largest disagreement beyond this factor is a regression.
-#: Random samples cause smaller growth.
+#: A regression: new disagreement > GROWTH_FACTOR * old disagreement.
+#: Other random samples cause smaller growth.
 GROWTH_FACTOR = 2.0
-#: Growth is no regression if the new disagreement (in eps * scale) is below this number.
-#: A single rounding error can be as large as this number.
+#: Smaller new disagreements (eps * scale) are no regressions.
+#: A single rounding error can be 2 eps * scale.
 DISAGREEMENT_FLOOR = 2.0
-#: Growth of a ratio of disagreement to bound is no regression if the new ratio is below this number.
+#: Smaller new ratios (disagreement / bound) are no regressions.
 _BOUND_RATIO_FLOOR = 0.1
 
 

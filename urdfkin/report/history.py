@@ -34,20 +34,22 @@ from urdfkin.system.files import MAX_BYTES, abbreviate_path, is_folder, read_byt
 from urdfkin.validation.document import OUTCOMES, VALIDATION, BoundRatio, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import package_versions
 
-#: Maximum number of reports, and of files in a folder.
+#: Maximum numbers of reports, and of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
-#: The charts of the page show the latest CHARTED_RUNS runs.
+#: The list of robots shows the latest MARKED_RUNS verdicts.
+#: The charts show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: Maximum number of runs, and of changes, on a terminal without the option --all.
-#: The HTML page lists at most this number of changes of all robots together.
+#: A terminal shows at most MAX_SHOWN runs and MAX_SHOWN changes.
+#: The option `--all` removes the limit on a terminal.
+#: The HTML page's list of changes has at most MAX_SHOWN entries.
 MAX_SHOWN = 20
-#: Maximum number of runs, and of changes, in the HTML page's section on one robot.
+#: A robot's section lists at most this number of runs.
+#: The same limit holds for changes in the section.
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot.
-#: The key "" is for a run whose report does not contain the robot.
+#: The key "" is for a report without the robot.
 VERDICT_MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the chart of disagreements, as log10(disagreement / bound).
+#: Lower end of the disagreement chart: log10(disagreement / bound).
 _MIN_LOG_RATIO = -3.0
 
 
@@ -117,9 +119,9 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Changes between runs, by the source of the changed robot.
-#: The key None is for changes of a whole run, for example its number of samples.
-#: Each change has the index of its run.
+#: Pairs (index of the run, change), by the robot's source.
+#: The key None is for changes of a whole run.
+#: Such a change is another number of samples.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 

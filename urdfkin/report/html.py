@@ -55,14 +55,14 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
 
-#: Up to this number of robots, the details of all robots are open at first.
+#: Up to this number of robots, all details are open.
 _MAX_OPEN_ROBOTS = 1
-#: Maximum number of unverified robots whose details the page shows at first.
+#: Maximum number of unverified robots with open details.
 _MAX_OPEN_FAILURES = 20
-#: If a report has more robots than this number, verified robots have no histograms.
+#: Above this number of robots, verified robots have no histograms.
 #: The histograms of one robot take a second of computing time.
 _MAX_DRAWN = 100
-#: If the details of all robots have more characters than this number, each robot has a separate file.
+#: Above this number of characters, each robot has a separate file.
 MAX_PAGE_CHARACTERS = 5_000_000
 
 
@@ -301,7 +301,7 @@ class NotebookView:
         )
 
     def _repr_html_(self) -> str:
-        # The HTML frame may run its own scripts but cannot access the notebook.
+        # The HTML frame may run scripts but cannot access the notebook.
         return (
             f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
             f' style="width:100%;height:{self._height}px;border:0"></iframe>'

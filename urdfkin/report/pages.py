@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _DISPLAY_UNITS = DisplayUnits(digits=6)
 
-#: Ratios of disagreement to bound at which the colour of the heat map changes.
+#: Edges of the heat map's colours, as disagreement / bound.
 HEAT_EDGES = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -208,7 +208,7 @@ def _bound_ratio(check: ReportedCheck, subject: int) -> float:
     bound.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
-    # A disagreement of 0 has the ratio 0, even if the bound is 0.
+    # 0 / 0 counts as 0.
     if not value:
         return math.inf if value is None else 0.0
     if not tightest:

@@ -278,7 +278,7 @@ def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
-        # In a check without results, `bound[0]` is larger than `bound[1]`.
+        # A check without results has bound[0] > bound[1].
         if ratio or largest or check["worst_case"]:
             yield (
                 f"`bound` is {check['bound']}, as in a check without results, but `worst`, `bound_ratio` or"

@@ -40,11 +40,11 @@ MATCHED_BY_AXES = (
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Distances and angles up to this factor times the bound on rounding errors are not printed.
-#: The factor covers the rounding errors of sums of several terms.
+#: Printed distances and angles exceed ROUNDING_FACTOR * (rounding bound).
+#: The factor covers the rounding errors of sums.
 ROUNDING_FACTOR = 1.001
 #: Heading of a list of mimicked joints.
-#: Each listed joint can move a mimic joint beyond the mimic joint's limits.
+#: A listed joint can move its mimic joints beyond their limits.
 MIMIC_LIMITS_HEADING = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -352,14 +352,14 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
-#: `HALF_SIDE` is half the side length of a picture, in units of the SVG.
-#: The drawn robots are `FILLED_FRACTION` times as wide or as high as the picture.
+#: A picture has the side length 2 * HALF_SIDE (SVG units).
+#: The robots fill FILLED_FRACTION of the side length.
 HALF_SIDE, FILLED_FRACTION = 150.0, 0.9
-#: Maximum length of the scale bar, relative to the side length of a picture.
+#: (Maximum length of the scale bar) / (side length).
 MAX_SCALE_BAR_FRACTION = 0.3
-#: Distance of the scale bar from the picture's lower edge (SVG units).
+#: Margin below the scale bar (SVG units).
 SCALE_BAR_MARGIN = 6.0
-#: Length of the axes in the close view, relative to the distance between the two frames.
+#: Close view: (length of the axes) / (distance of the two frames).
 AXIS_FRACTION = 0.35
 #: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
@@ -470,8 +470,8 @@ def _make_picture(
     gap: FloatArray | None = None,
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
-    # Matrix that projects a point in space into the picture.
-    # In the picture, x points to the right, and y points down.
+    # The matrix projects a point into the picture.
+    # In the picture, x points right and y points down.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

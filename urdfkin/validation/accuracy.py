@@ -53,8 +53,9 @@ from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compu
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
-#: Representations of the orientation, by the reference of an `AccuracyLine`.
-#: Angles about fixed axes are omitted, because they are Euler angles in the reverse order.
+#: Representations of the orientation. Keys: `AccuracyLine.reference`.
+#: Angles about fixed axes are Euler angles in reverse order.
+#: Therefore, the study omits angles about fixed axes.
 _ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -241,7 +242,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
         near: (m, 4) quaternions. They determine the signs of the returned quaternions q: q . near > 0.
     """
     K = davenport_matrix(R)
-    q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.
+    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I = 4 q q^T
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
     return unit
 

@@ -99,7 +99,8 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
-#: Maximum size of the data in a file after decompression. A larger file counts as damaged.
+#: Maximum size of a file's decompressed data.
+#: A larger file counts as damaged.
 _MAX_UNPACKED_BYTES = 2**27
 
 

@@ -44,10 +44,11 @@ from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
-#: Minimum number of chunks of a robot with 200 or more samples, so that several workers can share the robot.
+#: Minimum number of chunks of a robot with 200 samples.
+#: Several workers can then share the robot.
 _MIN_CHUNKS = 8
-#: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
-#: For a robot with seven joints, 1000 configurations take about half a second.
+#: A chunk has at most 40 * DRAW_SIZE = 1000 configurations.
+#: For seven joints, 1000 configurations take about 0.5 s.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -254,7 +255,7 @@ class _FrameComparison(_Comparison):
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.magnitudes = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
         # A joint and its child link have the same Jacobian.
-        # In the list of frames, the links come first, beginning with the root.
+        # In `frames`, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -360,8 +361,9 @@ def _expand_mimic(tree: KinematicTree, free_tree: KinematicTree, q: FloatArray) 
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]
-#: The cache contains only the latest robot. A worker gets the chunks of a robot one after another.
-#: Two large robots in the cache would need too much memory.
+#: The cache contains only the latest robot.
+#: A worker gets a robot's chunks one after another.
+#: Two large robots would need too much memory.
 _cache: dict[RobotInput, _Models] = {}
 
 

@@ -30,19 +30,19 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: Largest `DiagnosisCase.remainder` of a mistake that explains the user's results.
+#: Largest `DiagnosisCase.remainder` of a mistake that counts as found.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
-#: Number of configurations in a fast first test for exchanged joints.
+#: Number of configurations in the first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: Smallest scale, relative to the largest scale. Each difference is divided by its scale.
+#: Smallest scale of a difference, relative to the largest scale.
 _MIN_SCALE = 1e-9
-#: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
+#: Equal numbers: |difference| <= _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
 _SWAPPED_HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
-#: Inputs of a function: q, or q and v, or q, v and a.
+#: Inputs of a function: (q), (q, v) or (q, v, a).
 Inputs = tuple[FloatArray, ...]
 
 
@@ -116,7 +116,7 @@ def diagnose(mistakes: Mistakes, case: DiagnosisCase) -> list[str]:
     return []
 
 
-#: Description of a mistake, and a function that returns urdfkin's results with this mistake.
+#: (description, function that returns results with the mistake)
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -366,9 +366,7 @@ class Mistakes:
                     order[[at[1], to[1]]] = order[[to[1], at[1]]]
                 try:
                     predicted = self._compute_with_order(case, first_inputs, order)
-                except (
-                    UrdfkinError
-                ):  # In some conventions, a mimic joint has a coordinate with another value.
+                except UrdfkinError:  # The convention requires another value of a mimic joint.
                     continue
                 if case.remainder(predicted, _FIRST_SAMPLES) <= EXPLANATION_TOLERANCE:
                     exchanged = self._exchange_joints(case.inputs, tuple(at), tuple(to))

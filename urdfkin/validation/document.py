@@ -475,7 +475,7 @@ class ValidationVerdict(StrEnum):
 
 
 EXIT_DISAGREES, EXIT_BAD_INPUT, EXIT_NOT_VERIFIED = 1, 2, 3
-#: Exit code of an interrupted run, as in shells: 128 + SIGINT.
+#: As in shells: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
 _VERDICT_WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),

@@ -33,7 +33,8 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Function that an engine calls with a task and its answer. A task has at most one answer.
+#: An engine calls the function with a task and its answer.
+#: A task has at most one answer.
 AnswerCallback = Callable[[Task, Answer], None]
 
 

@@ -23,7 +23,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, broadcast_k
 from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 
-#: The libraries of a cross check, in the order of columns.
+#: The libraries of a cross check, in column order.
 CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
 
 
@@ -128,7 +128,7 @@ def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
 
 #: Edges of the histogram, in eps * scale: ten bins per decade.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
-#: Key of error statistics: the quantity, and the reference frame ("" if there is none).
+#: Key of error statistics: (quantity, reference frame or "").
 Key = tuple[str, str]
 Inputs = tuple[list[float], list[float], list[float]]
 

@@ -18,13 +18,14 @@ from pathlib import Path
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum size (bytes) of an array of results; one frame's array can be larger.
+#: Maximum size (bytes) of a block of results.
+#: The results of one frame may be larger.
 MAX_BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FREE_FRACTION = 0.5
 #: Measured memory of Pinocchio 4.1.0. Its workspace is proportional to nv^3.
 _BYTES_PER_NV_CUBED, _BYTES_PER_LINK = 64, 24_000
-#: Maximum number of arrays in memory at the same time; each contains the results of a block of frames.
+#: Maximum number of blocks of results in memory.
 _MAX_ARRAYS = 12
 _PROC = Path("/proc")
 _CGROUPS = Path("/sys/fs/cgroup")

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 
 _MAX_ANSWER_BYTES = 64 * 2**20
 #: Maximum length of a program's error text in a message.
-#: The length is in characters for an entry `error`, and in bytes for the program's standard error.
+#: Unit: characters of an entry `error`, bytes of standard error.
 _MAX_ERROR_LENGTH = 300
-#: Number of consecutive failures after which the program is not started again.
+#: After this number of consecutive failures, the program stays stopped.
 _MAX_FAILURES = 3
 #: One day, s.
 _MAX_TIMEOUT = 86400.0
@@ -155,7 +155,7 @@ class Program:
             answer = self._parse_answer(self._request_answer(request.encode()))
         except ProgramError:
             self._failures += 1
-            self._stop()  # A delayed answer would be read as the next request's answer.
+            self._stop()  # A late answer would be the next request's answer.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):
@@ -163,7 +163,7 @@ class Program:
         return answer["result"]
 
     def _start(self) -> None:
-        self._error_output: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  The file must stay open while the process runs.
+        self._error_output: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  The process writes to the file.
         try:
             self._process = subprocess.Popen(
                 self.command,

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 #: Outcome of a chunk, and data.
 #: "answer": The data are the pickled answer.
-#: "died": The data are the signal or exit status of the second crash.
-#: "other code": The data are the worker's versions and digests, which differ from the client's.
+#: "died": The data are the second crash's signal or exit status.
+#: "other code": The data are the worker's versions and digests.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

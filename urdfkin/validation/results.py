@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
 #: Packages that display results, but compute no results.
-#: A campaign can resume if only the code of these packages has changed.
+#: A campaign can resume after a change of these packages.
 _DISPLAY_PACKAGES = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
@@ -104,7 +104,7 @@ class RobotReport:
         if (case := self.error_stats[key].case) is None:
             return None
         row = QUANTITIES[quantity]
-        # A link may have the same name as a joint.
+        # A link and a joint may have equal names.
         # Therefore, a joint needs the prefix "joint:".
         frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.

@@ -100,7 +100,7 @@ class RobotInput:
                 lock=dict(self.origin.lock),
                 source_findings=self.source_findings,
             )
-        robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
+        robot.verifier.origin = self.origin  # The origin names the text's file.
         return robot
 
     def load(self) -> Robot:
@@ -164,7 +164,7 @@ def _make_robot_input(
     source = unambiguous_path(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
         return _from_path_or_name(source, mimic, root_joint)
-    text = read_source(cast("Source", source))  # An open file, or standard input, can be read only once.
+    text = read_source(cast("Source", source))  # Open files can be read only once.
     if is_mjcf(text.data):
         return _make_robot_input(text.data, mimic, root_joint, None)
     return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)

@@ -401,7 +401,7 @@ def _check_or_write_manifest(store: Store, retry: Sequence[range] | None) -> Sto
     if retry is not None:
         whole = range(len(store.manifest.chunking))
         robots = zip(before.manifest.robots, store.manifest.robots, retry, strict=True)
-        # All failures of a changed file are outdated, also those of other shards.
+        # A changed file's failures are outdated, in every shard.
         before.delete_failures([chunks if old == new else whole for old, new, chunks in robots])
     if is_changed:
         store.write(_MANIFEST, store.manifest.as_json())
@@ -451,7 +451,7 @@ def _acquire_lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_LOCK_ATTEMPTS):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # A reader of the store holds the lock for a moment in `Store.writing_process`.
+        time.sleep(0.1)  # `Store.writing_process` also holds the lock for a moment.
     raise InputError(
         "another process uses this store",
         where=str(folder),

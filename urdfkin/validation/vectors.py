@@ -57,21 +57,26 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Programs that read version 1 can read all versions 1.x.
+#: A program for version 1.0 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
-#: Number of configurations of each robot. The first configuration is the zero configuration.
-#: If the limits exclude zero, the joint is at the limit nearest to zero.
+#: Number of configurations of each robot.
+#: The first configuration is the zero configuration.
+#: Outside the limits, the nearest limit replaces zero.
 SAMPLES = 3
 #: Largest absolute value of random v and a.
-#: The same limit holds for random q of planar and floating joints, except quaternions.
+#: Random q of planar and floating joints have the same limit.
+#: Quaternions have no such limit.
 _MAX_RANDOM = 2.0
-#: Inputs are rounded to multiples of 1 / _STEPS_PER_UNIT, except quaternions and values at a joint limit.
-#: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
+#: Inputs are multiples of 1 / _STEPS_PER_UNIT.
+#: Quaternions and values at a joint limit are not.
+#: Multiples of 1 / 1024 have at most ten decimals.
+#: A double represents these multiples without rounding.
 _STEPS_PER_UNIT = 1024.0
-#: The tolerance k * eps * scale is rounded to the nearest number with 12 significant digits.
-#: This rounding removes the last digits, which differ between processors.
-#: The tolerance is then rounded upward to 3 significant digits.
+#: Significant digits of the tolerance k * eps * scale.
+#: First, the tolerance is rounded to the nearest 12 digits.
+#: The removed digits differ between processors.
+#: Then, the tolerance is rounded upward to 3 digits.
 _TOLERANCE_DIGITS, _FIRST_TOLERANCE_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -79,9 +84,9 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The spatial acceleration is the classical acceleration minus w x v.
-#: The bound of ACCELERATION includes the error of w x v.
-#: Therefore, spatial and classical acceleration have the same bound.
+#: Spatial acceleration = classical acceleration - w x v.
+#: ACCELERATION's bound includes the error of w x v.
+#: Therefore, the two accelerations have the same bound.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip

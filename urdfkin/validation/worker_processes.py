@@ -37,7 +37,7 @@ from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, WorkQueue
 
 WORKER_MODULE = "urdfkin.validation.worker_processes"
-#: Maximum time to wait for the exit status of a crashed worker, s.
+#: Time limit for a crashed worker's exit status, s.
 _EXIT_TIMEOUT = 5.0
 
 
@@ -50,7 +50,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Close this copy of the worker's end, so that the pipe closes when the worker ends.
+            # Without this copy, the pipe closes when the worker ends.
             theirs.close()
 
     @property
@@ -178,7 +178,8 @@ class _WorkerPool:
                     self._workers.append(worker)
             except Exception as error:
                 if self._workers:
-                    # No new process can be started, so an existing worker process takes the task later.
+                    # The system allows no new process.
+                    # An existing worker process takes the task later.
                     self._queue.put_back(task, tasks)
                     return
                 self._record_answer(task, make_lost_failure("no process could be started", error))

@@ -40,11 +40,11 @@ from typing import Any
 
 import numpy as np
 
-#: Value of a joint: one number; 3 (planar) or 7 (floating).
+#: A joint's value: 1 number, 3 (planar) or 7 (floating).
 JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
-#: Suffixes of the joints that replace a planar joint in MuJoCo.
+#: Suffixes of MuJoCo's joints for a planar joint.
 _MUJOCO_PLANAR_SUFFIXES = ("_TX", "_TY", "_RZ")
 
 
@@ -120,7 +120,7 @@ def read_pinocchio(source: str) -> LibraryModel:
     slots: dict[str, tuple[int, int]] = {}
     # In Pinocchio, joint 0 is the world.
     for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-        # Pinocchio combines several MJCF joints of one body into a composite joint.
+        # Pinocchio combines a body's MJCF joints into a composite joint.
         # The composite joint has the first joint's name.
         group = groups.get(name.removeprefix("Composite_"), []) if name.startswith("Composite_") else []
         if len(group) == joint.nq > 1:
@@ -175,7 +175,7 @@ def read_mujoco(source: str) -> LibraryModel:
         warnings.simplefilter("ignore")
         model = (mujoco.MjModel.from_xml_path if _is_path(source) else mujoco.MjModel.from_xml_string)(source)
     data = mujoco.MjData(model)
-    # Unnamed MJCF bodies and joints have urdfkin's names, such as `joint3`.
+    # Unnamed bodies and joints have urdfkin's names, such as `joint3`.
     names = [model.joint(i).name or f"joint{i}" for i in range(model.njnt)]
 
     def compute_poses(values: Mapping[str, JointValue]) -> Poses:
@@ -403,7 +403,7 @@ def read_newton(path: str) -> LibraryModel:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # Newton adds a free joint to a body without a joint.
+    # Newton adds a free joint to bodies without a joint.
     q_slots = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, mimicked_joint, start, count in zip(

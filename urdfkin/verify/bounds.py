@@ -187,7 +187,7 @@ class _MovingJoint(NamedTuple):
 class _FrameEnd(NamedTuple):
     """The part of a frame's path after the last moving joint."""
 
-    step: int  # Index of this joint in `_Lengths.joints`, or -1 without a moving joint.
+    step: int  # Index in `_Lengths.joints`; -1: no moving joint.
     frame: int
     length: float  # m.
 
@@ -541,7 +541,7 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Number of cross products in the linear rows of Pinocchio's dJ_i/dq_j.
+#: Number of cross products in Pinocchio's linear rows of dJ_i/dq_j.
 #: The joints on the path are numbered from the root.
 #:
 #: | | Two revolute joints, z x (z x d) | A revolute and a prismatic joint, z x z |
@@ -700,7 +700,7 @@ def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
-        # Other threads may read the cache, so a stored array is complete.
+        # Store only a complete array: other threads read the cache.
         plan.cache["column weights"] = weights
     return weights[0], weights[1]
 

@@ -326,5 +326,6 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy may run in another process, so its counts begin at 0.
+        # A copy's counts begin at 0.
+        # The copy may be in another process.
         return type(self), ()

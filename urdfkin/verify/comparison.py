@@ -116,7 +116,7 @@ def worst_disagreements(
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # Fewer than n rows in `scale_rows`: the kernel needs working memory.
+        # Configurations share rows of `scale_rows`: the kernel needs working memory.
         if len(scale_rows) < n:
             unit, units, out_bits = np.empty(scale_rows.size), np.zeros(width), worst.view(np.int64)
             bits = units.view(np.int64)

@@ -219,7 +219,7 @@ def check_model_source(verifier: Verifier, converted: ConvertedModel, source: An
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _compute_model_placements(model, _convert_configurations(model, tree, q), converted)
-    # The URDF text has rounded angles, so the factor is 2.
+    # Factor 2: the URDF text has rounded angles.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -273,7 +273,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     differences = np.abs(theirs - table.placement(own))[:, :3]
-    # The table's base and tool may have rotations with six digits.
+    # The table's base and tool may have only six digits.
     # The URDF contains exact rotations.
     # The bound therefore includes `_orthogonality_defect`.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)

@@ -42,8 +42,9 @@ def derive_analytical_jacobian(
         quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs = quaternion_jacobian(quat, J_v)
-        # q and -q are the same rotation; results have qw >= 0.
-        # If |qw| is below the rounding error, q and -q are accepted.
+        # Results have qw >= 0.
+        # Near qw = 0, rounding errors decide the sign of q.
+        # Near qw = 0, the check therefore accepts q and -q.
         opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]

@@ -32,7 +32,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMA
 
 _INFINITY_BITS = 0x7FF0000000000000
 _MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: While comparing row i, the kernel prefetches row i + _PREFETCH_DISTANCE.
+#: With row i, the kernel prefetches row i + _PREFETCH_DISTANCE.
 _PREFETCH_DISTANCE = 4
 
 

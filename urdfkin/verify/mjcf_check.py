@@ -144,7 +144,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
-    # The URDF text has rounded angles, so the factor is 2.
+    # Factor 2: the URDF text has rounded angles.
     magnitudes = mujoco_magnitudes(compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE))
     bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)

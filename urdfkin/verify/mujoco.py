@@ -51,7 +51,7 @@ _MASS = "1"
 #: MuJoCo's loading time grows with (number of links)^2.
 #: MuJoCo's own limit (1,023 links) applies only after loading.
 _MAX_DEPTH = 1_000
-#: MuJoCo's joints for a planar or floating joint, in coordinate order.
+#: MuJoCo's joints for one joint, in coordinate order.
 _REPLACEMENT_JOINTS = {
     "planar": ("slide x", "slide y", "hinge"),
     "floating": ("slide x", "slide y", "slide z", "ball"),

@@ -106,7 +106,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 
 #: Pairs (nq, nv) of three kinds of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-#: urdfkin's nq of a joint, by the joint's (nq, nv) in Pinocchio.
+#: urdfkin's nq of a joint, by Pinocchio's (nq, nv).
 _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
@@ -166,7 +166,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._collect_arrays(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: Whether q (`_same_q`) or v (`_same_v`) needs no conversion for Pinocchio.
+        #: Whether Pinocchio's q (`_same_q`) or v (`_same_v`) equals urdfkin's.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -327,8 +327,9 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion, scalar last, of the rotation nearest to M (q-method, see the module)."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # The computed q has rounding errors along other eigenvectors of K.
-    # For a rotation M, multiplying by K + I = 4 q q^T removes these errors.
+    # The computed q has rounding errors along K's other eigenvectors.
+    # For a rotation M, K + I = 4 q q^T.
+    # Therefore, multiplying by K + I removes these errors.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit

@@ -108,17 +108,19 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Stack size per link; the parser of Pinocchio 4.1.0 needs less than 4 kB.
+#: Stack size per link.
+#: The parser of Pinocchio 4.1.0 needs less than 4 kB.
 _STACK_BYTES_PER_LINK = 16_384
-#: A chain with fewer joints causes no stack overflow in any thread.
+#: Shorter chains cause no stack overflow in any thread.
 _SAFE_DEPTH = 100
 #: Maximum nv of a robot, mimic joints included.
-#: Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), here 2 GB.
+#: Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured).
+#: For nv = 315, Pinocchio needs 2 GB.
 MAX_NV = 315
 
-#: A block of this size (128 kB) fits into the processor's cache.
+#: A block of 128 kB fits into the processor's cache.
 _FLOATS_PER_BLOCK = 16384
-#: A call f(n) returns the results for the next n configurations.
+#: f(n) returns the results of the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
 

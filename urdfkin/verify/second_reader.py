@@ -31,19 +31,19 @@ from urdfkin.verify.oracle import resolve_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference of a rotation entry in two programs.
+#: Largest difference of a rotation entry in two programs.
 #: An entry is a b c + d e with |a b c| + |d e| <= 1.
-#: Each sine or cosine a to e has the relative error eps.
-#: These five errors change the entry by at most 3 eps.
-#: Rounding the products and the sum adds at most 1.5 eps.
+#: Relative error of a sine or cosine: at most eps.
+#: The errors of a to e add at most 3 eps.
+#: The products and the sum add at most 1.5 eps.
 #: Two programs: 2 (3 + 1.5) eps = 9 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Bound on the difference of an axis component in two programs.
-#: An axis length has a relative error of at most 2 eps.
+#: Largest difference of an axis component in two programs.
+#: Relative error of an axis length: at most 2 eps.
 #: The quotient is rounded once, with at most 0.5 eps.
 #: Two programs: 2 (2 + 0.5) eps = 5 eps.
 _AXIS_TOLERANCE = 5.0 * EPS
-#: A unit axis of yourdfpy satisfies |length - 1| <= _UNIT_TOLERANCE.
+#: An axis is a unit axis if |length - 1| <= _UNIT_TOLERANCE.
 _UNIT_TOLERANCE = 1e-6
 _MAX_DIFFERENCES = 8
 _MAX_QUOTE_LENGTH = 200

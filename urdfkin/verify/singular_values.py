@@ -37,8 +37,8 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
-#: Bound on the relative rounding error of a sum of products.
-#: It covers a few dozen positive numbers.
+#: Largest relative rounding error of a sum of products.
+#: The bound covers a few dozen positive numbers.
 _RELATIVE_ROUNDING_ERROR = 256.0 * EPS
 _MAX_PRINTED_SAMPLES = 10
 
@@ -247,7 +247,7 @@ def singular_values(
         defect = _bound_orthogonality_error(U) + _bound_orthogonality_error(Vt.swapaxes(-1, -2))
         lower = s * _bound_below(1.0 - defect)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _bound_above(1.0 + defect)[..., np.newaxis] + residual[..., np.newaxis]
-    # NaN -> 0 in lower bounds, NaN -> inf in upper bounds.
+    # A NaN becomes 0 (lower) or inf (upper).
     lower, upper = (
         np.nan_to_num(_bound_below(lower), nan=0.0),
         np.nan_to_num(_bound_above(upper), nan=np.inf, posinf=np.inf),
@@ -265,7 +265,8 @@ def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
 def _bound_norm(E: FloatArray) -> FloatArray:
     """Return an upper bound on the Frobenius norm of each matrix. All numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix with inf is not scaled; its norm is inf.
+    # A matrix with inf is not scaled.
+    # The norm of such a matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

@@ -36,8 +36,8 @@ _MAX_COLUMNS = 16
 #: A singular value's error is at most
 #: _ROUNDINGS * (rows + columns) * eps * (Frobenius norm).
 _ROUNDINGS = 16.0
-#: Singular values count as 0 below _RANK_TOLERANCE * (norm of the Jacobian).
-#: Unit vectors count as parallel if only one singular value is larger.
+#: Singular values below _RANK_TOLERANCE * norm count as 0.
+#: Unit vectors are parallel if only one value exceeds _RANK_TOLERANCE.
 _RANK_TOLERANCE = 1e-9
 
 
@@ -187,7 +187,7 @@ class _SingularityExplainer:
         The columns span the directions in which the frame moves in no sample.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
-        # An axis may pass through the frame's origin at every q.
+        # An axis may pass through the frame's origin for every q.
         # Then the samples consist of rounding errors.
         # `_bound_matrix_error` includes the base's distance from the world origin.
         # The samples have no base, so `_RANK_TOLERANCE` limits the noise.
@@ -305,7 +305,7 @@ class _SingularityExplainer:
         # Four such lines need not be coplanar.
         if are_parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(columns) == 3 else ''}."
-        # If all axes pass through a: v = a x z in each column [v; z].
+        # Axes through a point a have columns [a x z; z].
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > tolerance * float(np.linalg.cond(crosses)):

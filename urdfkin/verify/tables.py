@@ -49,7 +49,7 @@ from urdfkin.model.configuration import Samples
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
-#: Largest ratio of the length L to the reach (see the module).
+#: Largest ratio L / reach (see the module).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -290,7 +290,7 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
     table_length = sum_table_lengths(table)
     reach = np.maximum(reach, np.minimum(table_length, MAX_LENGTH_RATIO * reach))
     # `Joint.pinocchio_tilt`: angle between urdfkin's and Pinocchio's axis of a joint.
-    # An acceleration term has up to four rotated vectors, hence 4.
+    # Factor 4: an acceleration term has up to 4 rotated vectors.
     roundings = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * roundings + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)

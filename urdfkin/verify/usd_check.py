@@ -40,7 +40,7 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Tolerance for the angle (rad) between two frames of a joint.
+#: Tolerance for the angle (rad) between a joint's two frames.
 #: Unit: SINGLE_ROUNDOFF. Derivation: `_check_joint`.
 _ROTATION_ROUNDINGS = 18.0
 #: Tolerance for the origin of a joint's frame.
@@ -277,7 +277,7 @@ def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)[0]
-    # The root's pose is arbitrary, so poses are relative to the root.
+    # Poses are relative to the root, whose pose is arbitrary.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest

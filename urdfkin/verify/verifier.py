@@ -426,7 +426,7 @@ def compute_own_results(quantity: Quantity, x: CallPart) -> FloatArray:
     return quantity.compute_results(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-#: The comparison reports inf and NaN, so NumPy's warnings are redundant.
+#: NumPy's warnings are redundant: the comparison reports inf and NaN.
 _ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 

@@ -32,13 +32,13 @@ from urdfkin.verify.bounds import DecimalErrors
 
 #: Digits of reference values; long paths need more (`enough_digits`).
 #: A double has about 16 digits.
-#: Therefore, 50 digits are enough to measure the rounding errors of doubles.
+#: 50 digits are enough to measure rounding errors of doubles.
 REFERENCE_DIGITS = 50
 #: Digits of intervals on a path without joints (`enough_digits`).
 _BASE_DIGITS = 30
 _BITS_PER_DIGIT = math.log2(10.0)
-#: An interval of 15 digits has 50 + 5 = 55 bits.
-#: With 53 bits, its width could be four spacings of doubles.
+#: Intervals of 15 digits have 50 + 5 = 55 bits.
+#: With 53 bits, an interval could span four spacings of doubles.
 _ADDITIONAL_BITS = 5
 #: A decimal of 17 digits determines every double.
 _SIGNIFICANT_DIGITS = 17
@@ -76,7 +76,7 @@ def as_interval(value: Number) -> Number:
 
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return both ends, rounded outward to doubles."""
-    # x is usually the integer 0, so this shortcut saves time.
+    # Usually, x is the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
@@ -187,7 +187,7 @@ def _compute_gram_residual(M: Matrix) -> Matrix:
     return x, y, z
 
 
-#: First URDF version with the attribute `quat_xyzw`; older versions ignore it.
+#: First URDF version with the attribute `quat_xyzw`.
 _FIRST_QUATERNION_VERSION = (1, 1)
 
 

@@ -29,8 +29,8 @@ from urdfkin.verify.oracle import BaseMotionLike
 
 _RECURSION = Recursion(equations)
 
-#: A pair (axis of the child link, is_angular) for each velocity.
-#: Axes 0, 1, 2 are x, y, z.
+#: Each velocity has a pair (axis, is_angular).
+#: Axes of the child link: 0 = x, 1 = y, 2 = z.
 _VELOCITY_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
