@@ -1,12 +1,12 @@
-"""Read a robot file with other libraries, with one adapter for each library.
+"""Read a robot file with other libraries. Each library has one adapter.
 
-Besides the standard library, this module imports only NumPy and the chosen library. The command `urdfkin
-readers` runs `main` in a new process. `scripts/make_libraries.py` runs this module as a program, with the
-Python interpreter of a virtual environment in which one library is installed:
+Besides the standard library, this module imports only NumPy and the chosen library. The command
+`urdfkin readers` runs `main` in a new process. `scripts/make_libraries.py` runs this module as a program, in
+a virtual environment with one library:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
-The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
+The program reads a list of cases `{"name", "text", "configurations"}`. It prints one line of JSON for each
 case. `text` is a URDF text, or the path of an MJCF or USD file. A configuration maps the name of each
 independent joint to the joint's value:
 
@@ -17,7 +17,7 @@ independent joint to the joint's value:
 | floating | seven numbers (x, y, z, qx, qy, qz, qw) |
 
 An adapter passes all inputs that the library's documentation requires. It passes only values of independent
-joints, because the library can read the mimic rules in the file. An adapter does not correct wrong poses.
+joints. The library can read the mimic rules in the file. An adapter does not correct wrong poses.
 """
 
 from __future__ import annotations
@@ -54,9 +54,8 @@ class LibraryModel:
 
     Attributes:
         joints: Names of the joints with a coordinate.
-        compute_poses: Returns the pose (4, 4) of each link that the library has not merged with another link.
-            The poses of a URDF are relative to the root link. The poses of MJCF and USD files are relative to
-            the world.
+        compute_poses: Returns the pose (4, 4) of each link. Merged links are omitted. The poses of a URDF are
+            relative to the root link. The poses of MJCF and USD files are relative to the world.
     """
 
     joints: list[str]
@@ -148,7 +147,7 @@ def read_pinocchio(source: str) -> LibraryModel:
 
 
 def _find_joints_of_bodies(path: str) -> dict[str, list[str]]:
-    """Return the joints of each body in an MJCF file, by the name of the body's first joint."""
+    """Return the joints of each MJCF body, by the name of its first joint."""
     bodies: list[list[str]] = []
     with contextlib.suppress(ET.ParseError):
         for body in ET.parse(path).iter("body"):
@@ -343,7 +342,7 @@ def read_kinpy(text: str) -> LibraryModel:
 
 
 def read_ikpy(text: str) -> LibraryModel:
-    """Read only one path from the root to a tip, because ikpy does not support branches."""
+    """Read one path from the root to a tip. ikpy does not support branches."""
     from ikpy.chain import Chain
 
     root, children = _find_root(text), _find_child_links(text)

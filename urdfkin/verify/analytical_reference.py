@@ -1,8 +1,8 @@
 """Compute analytical Jacobians (eq. 7.122) from a rotation matrix and a velocity Jacobian.
 
-urdfkin compares these Jacobians with the results of `urdfkin.kinematics.rotation` and
-`urdfkin.kinematics.bodies`. This module shares no code with `rotation` or `bodies`. The functions also accept
-arrays of fifty-digit numbers, for the accuracy study.
+The Jacobians check the results of `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`. This module
+shares no code with `rotation` or `bodies`. The functions also accept arrays of fifty-digit numbers, for the
+accuracy study.
 """
 
 from __future__ import annotations

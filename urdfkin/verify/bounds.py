@@ -86,7 +86,7 @@ class Magnitudes:
     """Upper bounds on the lengths of a frame's position, velocities and accelerations.
 
     Attributes:
-        p: (n, frames) path length from the world's origin to the frame, with joint displacements, m.
+        p: (n, frames) path length (m) from the world origin to the frame. Joint displacements are included.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
@@ -299,7 +299,7 @@ class Bound:
 def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
     """Broadcast `bound.k` to a batch shape.
 
-    If k <= 0 or k = inf, k becomes NaN, so that no result is accepted.
+    k <= 0 or k = inf becomes NaN. A comparison accepts no result with k = NaN.
     """
     k = bound.k.reshape(bound.k.shape[: len(shape)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -350,8 +350,8 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors, in multiples of eps rad.
-        rule_count: Number of rules of all mimic joints on the path. For example, joint c has two rules if
-            c mimics b and b mimics a.
+        rule_count: Number of rules of all mimic joints on the path. Joint c has two rules if c mimics b and b
+            mimics a.
         lengths: (steps + 1,) lengths that are added to `CompiledTree.lengths`, m.
     """
 
@@ -378,7 +378,7 @@ def true_value_magnitudes(
     | axis, used by two rotations | 2 * 0.5 |
     | true value, rounded to 17 digits | 0.5 |
 
-    *Angles and mimic rules.* Their larger errors are added:
+    *Angles and mimic rules.* Errors of angles and mimic rules are added:
 
         relative error of roll, pitch and yaw = eps / 2
         rotation of all vectors after the joint <= eps (|roll| + |pitch| + |yaw|) / 2
@@ -512,7 +512,7 @@ def jacobian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Refere
     | prismatic joint: [z; 0] | 1 | 0 |
     | joint that is not on the path | 0 | 0 |
 
-    The scale of a mimic joint is multiplied by |multiplier|, and added to the mimicked joint's scale.
+    A mimicked joint's scale also contains |multiplier| * (scale of the mimic joint).
     """
     turning, sliding = sum_multipliers(plan)
     linear, angular = eq.turning_column(turning, magnitudes.p[..., None])
@@ -605,8 +605,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound on Jacobians with Euler angles.
 
-    The position rows have the same bound as the velocity Jacobian. The other rows are u . w for the middle
-    angle, and r . w for the first and last angle:
+    The position rows have the velocity Jacobian's bound. The other rows are u . w (middle angle) and r . w
+    (first and last angle):
 
         w: angular part of a column of the velocity Jacobian
         e_i, u, t = R e_k: first, middle and last axis (`urdfkin.verify.analytical_reference`)
@@ -648,7 +648,7 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound on Jacobians with quaternions.
 
-    The position rows have the same bound as the velocity Jacobian, and q' has the same bound as w:
+    The position rows have the velocity Jacobian's bound. q' has the bound of w:
 
         delta: error of R
         elements of 4 q q^T: linear functions of R
@@ -678,8 +678,8 @@ def sign_limit(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
 def singularity_margin(plan: CompiledTree) -> float:
     """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    The margin is four times the error of a frame's rotation if the base has no rotation. Below the margin, no
-    digit of the Euler angles is reliable.
+    For a base without rotation, the margin is four times the error of a frame's rotation. Below the margin,
+    no digit of the Euler angles is reliable.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
@@ -687,7 +687,7 @@ def singularity_margin(plan: CompiledTree) -> float:
 def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     """Sum |multiplier| over the joints of a path that share a joint velocity.
 
-    For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
+    A joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
     Returns:
         Sums (frames, nv) for rotations, and sums (frames, nv) for translations.
@@ -710,8 +710,8 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    All other entries are 0 for every q. For WORLD with `root_at_origin=True`, a base motion can make these
-    entries nonzero. The other references ignore `root_at_origin`.
+    All other entries are 0 for every q. Exception: a base motion, for WORLD with `root_at_origin=True`. The
+    other references ignore `root_at_origin`.
 
         linear rows of a revolute joint: z x d
         WORLD: d leads from the joint to the world's origin

@@ -1,4 +1,4 @@
-"""Convert the arguments of a call to batches with one axis, and the results to the caller's shape."""
+"""Convert arguments to batches with one axis, and results to the caller's shape."""
 
 from __future__ import annotations
 
@@ -110,8 +110,8 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError. A subclass may have a different
-        `reshape`, so that a kernel could write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError. With the `reshape` of a subclass, a
+        kernel could write past the end of `out`.
         """
         if out is None:
             return None

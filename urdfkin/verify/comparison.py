@@ -1,8 +1,8 @@
-"""Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
+"""Compare results of urdfkin and an oracle, in eps * scale and as a fraction of the bound.
 
-`disagreement` defines the difference of two numbers. NumPy takes as long for the differences as Pinocchio
-takes for the results. Therefore, a compiled kernel replaces NumPy after some computing time
-(`urdfkin.compiled.preload`). The kernel and NumPy return equal numbers.
+`disagreement` defines the difference of two numbers. NumPy's differences take as long as Pinocchio's results.
+Therefore, a compiled kernel replaces NumPy after some time (`urdfkin.compiled.preload`). The kernel and NumPy
+return equal numbers.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, leading_axes: in
 
 
 def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare `units`, the largest difference in each result in eps * scale, with the bound."""
+    """Compare `units` with the bound. `units`: largest difference of each result, in eps * scale."""
     if not units.size:
         return BatchComparison()
     bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))

@@ -175,8 +175,8 @@ def check_orientations(
 ) -> None:
     """Compare Pinocchio's rotations with verified rotations.
 
-    The function compares rotation matrices, because angles at gimbal lock and signs of quaternions are not
-    unique. The bound includes the rounding errors of `R`.
+    The function compares rotation matrices. Angles at gimbal lock and signs of quaternions are not unique.
+    The bound includes the rounding errors of `R`.
 
     `orientations` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
     `make_command(k)` returns a command that computes sample k again.
@@ -250,7 +250,7 @@ def _compute_model_placements(model: Any, q: FloatArray, converted: ConvertedMod
 
 
 def _convert_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert q of urdfkin's tree to q (n, model.nq) of a model with the same joint names."""
+    """Convert urdfkin's q to q (n, model.nq) of a model with the same joints."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
@@ -290,6 +290,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _orthogonality_defect(table: DHTable) -> float:
-    """Sum the Frobenius norms of R^T R - I for the rotations of the table's base and tool."""
+    """Sum |R^T R - I| (Frobenius norm) for the table's base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -7,7 +7,7 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `derive_imu_reading` subtracts
-gravity from the oracle's result, in the sensor's axes. Because the two methods differ, a wrong sign of
+gravity from the oracle's result, in the sensor's axes. The two methods differ. Therefore, a wrong sign of
 gravity or a wrong order of steps causes a disagreement.
 """
 
@@ -57,7 +57,7 @@ def derive_analytical_jacobian(
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's poses of the frames b relative to frame a, with a bound.
+    """Return an oracle's poses of frames b relative to frame a, and a bound.
 
     The last frame of `x.plan` is frame a.
 

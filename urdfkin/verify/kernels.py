@@ -61,7 +61,7 @@ def _in_eps_scale(difference, size):
 
 @inline_function(fastmath={"nnan", "nsz"})
 def _largest_difference(ours, theirs, scale, i, k):
-    """Return the largest difference in row i, in multiples of eps * scale[k]; all numbers are finite."""
+    """Return the largest difference in row i, in eps * scale[k]. All numbers are finite."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _in_eps_scale(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -81,7 +81,7 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Write the largest difference of the rows x, y and z in column j to `units[j]`.
+    """Write the largest difference of column j's rows x, y, z to `units[j]`.
 
     The difference is in multiples of `unit[j]`, and may be NaN or inf.
     """
@@ -99,8 +99,8 @@ def _divide_triples(ours, theirs, unit, width, units):
 def _largest_bits(x, count):
     """Return the bits of the largest double.
 
-    As integers, the bits of doubles >= 0 have the same order as the doubles. The function ignores the sign
-    bit, because some processors set the sign bit of NaN.
+    The bits of doubles >= 0, as integers, have the doubles' order. The function ignores the sign bit. Some
+    processors set the sign bit of NaN.
     """
     most = 0
     for j in range(count):
@@ -160,8 +160,8 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 def coupling(full, columns, index, factor, out):
     """Add Jacobian columns of mimic joints.
 
-    Column i of `full` is multiplied by `factor[i]` and added to column `index[i]` of the sum. `out` contains
-    the rows of the sum, one after the other.
+    `factor[i]` * (column i of `full`) is added to column `index[i]` of the sum. `out` contains the rows of
+    the sum, one after the other.
     """
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):

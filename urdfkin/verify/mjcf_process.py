@@ -1,17 +1,17 @@
-"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader, in a separate process.
+"""Compile an MJCF file with MuJoCo and Pinocchio, in a separate process.
 
-A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory,
-or crash a parser. The process reads a request from standard input, and writes each answer as a line of JSON
-to standard output:
+A few lines of MJCF can require any amount of time and memory, or crash a parser. Examples are nested
+`<replicate>` and `nuser_body`. The process reads a request from standard input. The process writes each
+answer as a line of JSON:
 
 1. the robot, compiled without shapes and inertias
 2. the robot, compiled from the complete file, or the reason why MuJoCo does not compile this file
 3. the placements of the bodies by Pinocchio's reader
 
-A request without samples gets no third answer, and gets the second answer only if MuJoCo aligns a free body
+A request without samples gets no third answer. It gets the second answer only if MuJoCo aligns a free body
 with its inertial frame.
 
-If the process ends early, the answers that it has already written remain valid.
+If the process ends early, its earlier answers remain valid.
 """
 
 from __future__ import annotations

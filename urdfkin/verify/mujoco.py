@@ -1,22 +1,21 @@
 """The oracle MuJoCo.
 
-MuJoCo reads the origins and axes of joints from the URDF text with its own parser. Unlike urdfkin and
-Pinocchio, MuJoCo computes with unit quaternions, and MuJoCo's six-vectors refer to a centre of mass. This
-module changes the text before MuJoCo reads it:
+MuJoCo's own parser reads the origins and axes of joints from the URDF text. Unlike urdfkin and Pinocchio,
+MuJoCo computes with unit quaternions. MuJoCo's six-vectors refer to a centre of mass. This module changes the
+text before MuJoCo reads the text:
 
 - Each link becomes a body without meshes. In the compiled model, only the root has a mass.
   The centre of mass, to which MuJoCo's results refer, is therefore the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
-- A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
-  body to the world. A planar joint becomes two slide joints and a hinge.
-- Mimic rules are removed. MuJoCo would convert mimic rules to constraints, and MuJoCo's kinematics ignores
-  constraints. This module computes the values of mimic joints with the rules from `parse_mimic_rules`.
+- A floating joint becomes three slide joints and a ball joint. MuJoCo's free joint can only connect a body to
+  the world. A planar joint becomes two slide joints and a hinge.
+- Mimic rules are removed. MuJoCo would convert mimic rules to constraints. MuJoCo's kinematics ignores
+  constraints. This module computes mimic joints with the rules from `parse_mimic_rules`.
 
-MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
-Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
-floating or planar joint, urdfkin's linear velocity is in the axes of the child link. The velocities of
-MuJoCo's slide joints are in the axes of the joint frame. S therefore also contains the rotation from the
-child's axes to the joint frame's axes. The angular velocities are equal.
+MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. S' is the time derivative of S. The robot's
+Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. S also
+rotates the linear velocity of a floating or planar joint: urdfkin's velocity is in the child link's axes,
+MuJoCo's slide velocities are in the joint frame's axes. The angular velocities are equal.
 """
 
 from __future__ import annotations
@@ -259,7 +258,7 @@ class MujocoOracle(Oracle):
     def _compute_poses(
         self, x: QueryBatch, input_count: int, store: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
-        """Return all placements, and call `store(body, (k, f))` for each sample k and frame f.
+        """Return all placements. For each sample k and frame f, call `store(body, (k, f))`.
 
         MuJoCo receives the first `input_count` of q, v and a.
         """
@@ -358,7 +357,7 @@ class MujocoOracle(Oracle):
     def _compute_velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the time derivative of S.
 
-        The rotation R of a floating or planar joint has the derivative R [w]x.
+        The rotation R of a floating or planar joint satisfies R' = R [w]x.
         """
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
@@ -373,7 +372,7 @@ class MujocoOracle(Oracle):
 
 
 def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return rotations (n, s, s) and the number s of slide joints: planar s = 2, floating s = 3."""
+    """Return rotations (n, s, s) and the number s of slide joints."""
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _make_rotation_matrix(_normalise_quaternion(coordinates)), 3
@@ -401,7 +400,7 @@ def _move_mass_to_root(model: Any, root: str) -> Any:
 
 
 def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints depth first, with siblings sorted by name, and the links root first."""
+    """Return the joints depth first, and the links root first. Siblings are sorted by name."""
     robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     children, child_links = dict[str, list[_Joint]](), set[str]()

@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo.
 
-An oracle is a library whose results urdfkin compares with its own results. This module also converts the
-user's arguments into the form that an oracle receives. This conversion and the conversion for urdfkin's own
-computation share only the code for units and named poses. A wrong broadcast, order or name in one conversion
-therefore causes a disagreement.
+An oracle is a library. urdfkin compares its own results with the oracle's results. This module also converts
+the user's arguments for the oracle. urdfkin converts the arguments for its own computation with other code.
+The two conversions share only the code for units and named poses. A wrong broadcast, order or name in one
+conversion therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -17,12 +17,12 @@ Mimic rules: Pinocchio's model is built without mimic joints (`urdfkin.verify.pi
 therefore reads the mimic rules from the URDF text.
 
 Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one
-number, a planar joint three, a floating joint seven, and a mimic joint none.
+number. A planar joint has three, a floating joint seven, and a mimic joint none.
 
-Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation that
-is nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
-Davenport's q-method. The quaternion q of the nearest rotation maximizes q^T K q = trace(R(q)^T M), so q is
-the eigenvector of K for the largest eigenvalue.
+Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation
+nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
+Davenport's q-method. The quaternion q of R maximizes q^T K q = trace(R(q)^T M). Therefore, q is the
+eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules.
 
-    Each chain becomes one rule for the independent joint:
+    Each chain becomes one rule:
 
         q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
     """
@@ -324,7 +324,7 @@ def free_flyer_acceleration(base: BaseMotionLike) -> FloatArray:
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
-    """Return the unit quaternion, scalar last, of the rotation nearest to M (q-method, see the module)."""
+    """Return the unit quaternion (scalar last) of the rotation nearest to M."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # The computed q has rounding errors along K's other eigenvectors.
@@ -336,7 +336,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
 
 
 def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
-    """Return Davenport's matrix K of M. If M is a rotation with the quaternion q, K is 4 q q^T - I."""
+    """Return Davenport's matrix K of M. K = 4 q q^T - I if M is the rotation of q."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -430,10 +430,10 @@ class QueryBatch(NamedTuple):
     """The arguments of an oracle for n configurations.
 
     Attributes:
-        frames_are_joints: If True, `frames` contains `JointFrame` objects, and the oracle calls Pinocchio's
-            functions for joints, such as `getJointJacobian`.
-        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with the functions
-            for several frames. These functions may round differently.
+        frames_are_joints: If True, `frames` contains `JointFrame` objects. The oracle then calls functions
+            for joints, such as `getJointJacobian`.
+        uses_multi_frame_functions: If True, the oracle uses the functions for several frames, even for one
+            frame. These functions may round differently.
     """
 
     frames: Sequence[str]
@@ -460,7 +460,7 @@ class OracleQuery:
     """The user's arguments of one call.
 
     Args:
-        named_inputs: The user's text or mapping for each of q, v and a, or None for an array.
+        named_inputs: The user's text or mapping for q, v and a. None: an array.
         joints: Pairs (name, nv).
     """
 
@@ -537,7 +537,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
-        """Reshape a result to (n, frames, ...), without a change of the last `own_axes` axes.
+        """Reshape a result to (n, frames, ...). The last `own_axes` axes stay unchanged.
 
         Raises:
             OracleError: the batch shapes of the result and of the arguments differ.
@@ -570,7 +570,7 @@ class Oracle:
     Args:
         mimic: If False, mimic joints are independent joints.
         moving_base: A free-flyer moves the root.
-        root_joint: Kind of the root joint that is added to the joints of the text.
+        root_joint: Kind of the additional root joint.
         lock: Values of locked joints, rad or m.
 
     Attributes:
@@ -598,8 +598,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: a mimic rule is invalid, or the oracle's joints or coordinates have other names or
-                another order than the tree's.
+            OracleError: a mimic rule is invalid. Or the names or the order of joints or coordinates differ
+                from the tree's.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -659,10 +659,10 @@ class Oracle:
 def couple_columns(
     full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
 ) -> FloatArray:
-    """Return the product J_full G. The kernel and NumPy return identical results.
+    """Return J_full G. The kernel and NumPy return identical results.
 
-    For each i in `columns`, column i of J_full is multiplied by `factor[i]` and added to column `index[i]` of
-    the product. The order of `columns` is the order of the additions.
+    Each i in `columns` adds `factor[i]` * (column i of J_full) to column `index[i]`. The order of `columns`
+    is the order of the additions.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:

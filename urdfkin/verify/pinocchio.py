@@ -1,14 +1,14 @@
 """The oracle Pinocchio.
 
 Only this module and `urdfkin.verify.adapters` import Pinocchio. On PyPI, Pinocchio has the name `pin`. The
-PyPI project `pinocchio` contains plugins for the test runner nose, in a module that is also called
-`pinocchio`. If both projects are installed, Python imports the plugins.
+PyPI project `pinocchio` contains plugins for the test runner nose. The plugins' module is also called
+`pinocchio`. If `pin` and `pinocchio` are installed, Python imports the plugins.
 
 The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF text with its own parser.
 
-Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
-if their mimic joints are enabled. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic
-joints, and have the suffix "full". The mimic rules define a matrix G and a vector g_0 for the conversion:
+Pinocchio's model is built without mimic joints. With mimic joints, Pinocchio 4.1 rejects four of its own
+example robots. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic joints. They have
+the suffix "full". The mimic rules define a matrix G and a vector g_0:
 
     q_full = G q + g_0
     v_full = G v
@@ -140,11 +140,11 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    A limit on nv and a large stack prevent a crash of the process. `lock` contains the values of locked
-    joints, rad or m. With `lock_mimic_joints`, the mimic joints of locked joints are locked too.
+    A limit on nv and a large stack prevent a crash. `lock` contains the values of locked joints, rad or m.
+    `lock_mimic_joints` also locks the mimic joints of locked joints.
 
     Raises:
-        OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.
+        OracleError: nv > `MAX_NV`, Pinocchio rejects the text, or a joint to lock is missing.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -344,11 +344,10 @@ class PinocchioOracle(Oracle):
     def hessians(self, x: QueryBatch) -> FloatArray:
         """Return Pinocchio's Hessians, with two errors of Pinocchio 4.1 corrected.
 
-        - Pinocchio's array has C order, but the numbers have Eigen's order, in which the first index varies
-          fastest.
-        - In LOCAL, Pinocchio's derivative of a joint's column by the same joint's coordinates can be nonzero.
-          The true derivative is 0, because a joint's motion does not change the joint's own columns in the
-          frame's axes.
+        - Pinocchio's array has C order, but the numbers have Eigen's order. In Eigen's order, the first index
+          varies fastest.
+        - In LOCAL, Pinocchio's derivative of a column by the same joint's coordinate can be nonzero. The true
+          derivative is 0: in the frame's axes, a joint's motion does not change its own columns.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, reference, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
@@ -368,7 +367,7 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the joint Jacobian (n, 6, columns) in WORLD, with mimic joints, without the base."""
+        """Return the joint Jacobian (n, 6, columns) in WORLD. Mimic joints are included, the base is not."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
         # Pinocchio 4.1 crashes for a Jacobian without columns.

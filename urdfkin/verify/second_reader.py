@@ -1,11 +1,11 @@
-"""Read a robot's URDF a second time with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
+"""Read a robot's URDF with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
 
-Pinocchio checks the computed results. This module checks the data of the robot: links, joint kinds, origins,
-axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
+Pinocchio checks the computed results. This module checks the robot's data: links, joint kinds, origins, axes,
+limits, mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
-normalise axes. The report separates these faults from other differences. If the URDF omits a number, yourdfpy
-returns None, and the comparison uses urdfkin's default value.
+The library yourdfpy 0.0.60 has two known faults. It ignores the attribute `quat_xyzw` of an origin. It does
+not normalise axes. The report separates these faults from other differences. For a number that the URDF
+omits, yourdfpy returns None. Then the comparison uses urdfkin's default value.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def compare_with_yourdfpy(
 ) -> SecondReading:
     """Compare yourdfpy's tree with urdfkin's tree.
 
-    If `root_joint` is True, the tree's first link and first joint are not compared.
+    With `root_joint`, the tree's first link and first joint are not compared.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     # With a document type declaration, yourdfpy may read other files.

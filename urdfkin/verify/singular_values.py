@@ -17,7 +17,7 @@
 
 *Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. Before
 a norm is computed, all numbers are divided by the largest number. Products are computed from mantissas and
-exponents. If the residual overflows, the lower bound is 0 and the upper bound is inf.
+exponents. If the residual overflows, the bounds are 0 and inf.
 """
 
 from __future__ import annotations
@@ -184,12 +184,11 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
         The derivative of a singular value is u^T J' v. The vectors u and v are the left and the right
-        singular vector, and J' is the derivative of J. If the smallest singular value may be 0, the gradient
-        may not exist, and the result is NaN.
+        singular vector. J' is the derivative of J. If the smallest singular value may be 0, the result is
+        NaN. The gradient may not exist.
 
         Args:
-            H: (..., 6, nv, nv) Hessian of the frame in LOCAL_WORLD_ALIGNED, from `Robot.hessian` with the
-                same q and base.
+            H: (..., 6, nv, nv) `Robot.hessian` of the frame in LOCAL_WORLD_ALIGNED, for the same q and base.
 
         Raises:
             InputError: H has another shape or contains a number that is not finite.

@@ -1,4 +1,4 @@
-"""Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss of rank.
+"""Explain a singular Jacobian: rank, lost directions, and joints that cause the loss of rank.
 
 | Term | Meaning |
 |---|---|
@@ -6,8 +6,8 @@
 | null motion | right null vector of J, that is, joint velocities that do not move the frame |
 | minimal dependent set | linearly dependent columns that are independent if any column is removed |
 
-The joints of a minimal dependent set cause the loss of rank. The module states a geometric reason, such as
-parallel axes, only if the columns satisfy the condition within the error bound of J:
+The joints of a minimal dependent set cause the loss of rank. A geometric reason is, for example, parallel
+axes. The columns must satisfy its condition within the error bound of J:
 
     column of a revolute joint: [a x z; z]
     z: direction of the axis
@@ -48,11 +48,10 @@ class FrameJacobian:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, in world axes.
         error: (..., 6, nv) bounds on the errors of J.
-        is_revolute: (nv,) True for the column of a revolute or continuous joint, False for a prismatic joint.
-            None for the columns of a planar or floating joint, and of a joint that another joint mimics.
+        is_revolute: (nv,) True: column of a revolute or continuous joint. False: prismatic joint. None:
+            planar, floating or mimicked joint.
         active_entries: (6, nv) False for entries of J that are always 0.
-        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
-            base.
+        sample_jacobians: Returns Jacobians (n, 6, nv) at random configurations. The base is fixed.
         moving_base: Whether a base motion is given. A base motion can change the directions without motion.
     """
 

@@ -1,16 +1,16 @@
-"""Read a USD stage in a process with limits on time and memory, and compare the robot with OpenUSD's readers.
+"""Read a USD stage in a confined process, and compare the robot with OpenUSD's readers.
 
-Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
-from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
+The process has limits on time and memory. Pinocchio reads the URDF text that urdfkin writes for the tree. The
+conversion from the USD stage (scene) to the tree needs other checks. `load` therefore makes two comparisons:
 
-- OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin's parser must find the same bodies,
-  frames, degrees of freedom and limits for each joint. A difference raises OracleError.
-- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The file states these
-  transforms separately from the joint frames. In the stage's configuration of the joints, each link must have
-  its prim's transform. `load` reports a difference as a warning.
+- OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin must find the same bodies, frames,
+  degrees of freedom and limits. A difference raises OracleError.
+- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The file states prim
+  transforms separately from joint frames. In the stage's configuration, each link must have its prim's
+  transform. `load` reports a difference as a warning.
 
-A stage stores numbers in single precision. Both comparisons allow only differences that rounding to single
-precision can cause.
+A stage stores numbers in single precision. The two comparisons allow only differences that single precision
+can cause.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def read_usd(
 
     Raises:
         SourceError: The file is missing.
-        InputError: OpenUSD or urdfkin does not accept the stage, or the process ends without a robot.
+        InputError: OpenUSD or urdfkin rejects the stage, or the process ends without a robot.
     """
     version()
     path = expand_home(source)
@@ -174,9 +174,9 @@ class SinglePrecisionErrors:
     """Bounds on errors of rounding to single precision.
 
     Attributes:
-        links: (links, 2) largest position error (m) and largest angle error (rad) in any configuration.
-        joints: (joints, 3) position error (m), angle error (rad), and relative error of the mimic rule.
-            The first two are errors of the child link's pose in the parent link, at q = 0.
+        links: (links, 2) largest position error (m) and angle error (rad) in any configuration.
+        joints: (joints, 3) position error (m), angle error (rad), and relative error of the mimic rule. The
+            position and angle errors are those of the child link's pose in the parent link, at q = 0.
     """
 
     links: FloatArray

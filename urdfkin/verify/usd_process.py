@@ -1,7 +1,7 @@
-"""Read a USD stage in a separate process, with urdfkin's reader and with OpenUSD's readers.
+"""Read a USD stage in a separate process, with urdfkin and OpenUSD.
 
-A USD stage (scene) can require any amount of time and memory, or crash OpenUSD's parsers, which are written
-in C++. The request and the answer are JSON on standard input and standard output.
+A USD stage (scene) can require any amount of time and memory. A stage can crash OpenUSD's C++ parsers. The
+request and the answer are JSON on standard input and standard output.
 
 OpenUSD's package UsdPhysics has its own code for bodies, joint frames and limits. The answer contains the
 data from UsdPhysics and from `urdfkin.urdf.usd`, for a comparison.

@@ -1,7 +1,7 @@
-"""Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
+"""Compare a robot's results with Pinocchio or MuJoCo, and record the checks.
 
-The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape, and
-therefore also finds errors in the conversion to this shape.
+The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape.
+Therefore, the check also finds errors in the conversion to the batch shape.
 """
 
 from __future__ import annotations
@@ -230,8 +230,8 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that calls `compute` and checks the result.
 
-        Both functions have the same arguments; the last argument is `out`. The returned function returns None
-        if `compute` does not support the arguments, or if the oracle cannot check the robot.
+        The returned function has the arguments of `compute`; the last argument is `out`. It returns None in
+        two cases: `compute` does not support the arguments, or the oracle cannot check the robot.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -406,7 +406,7 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    The bound is constant if the quantity needs only q, the base is fixed and all joints are revolute.
+    The bound is constant for a quantity of q, a fixed base and revolute joints.
     """
     v, a = (*x.rates, None, None)[:2]
     is_constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
@@ -456,7 +456,7 @@ def as_verify(verify: object) -> Verify:
 def split_into_parts(verify: Verify, n: int, values_per_configuration: int) -> Iterator[slice | IntArray]:
     """Split the checked configurations into parts, and yield the indices of each part.
 
-    With "sample", the configurations are random, because equal steps could match a pattern in the batch.
+    With "sample", the configurations are random. Equal steps could match a pattern in the batch.
     """
     step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, values_per_configuration)))
     if verify == "sample" and n > SAMPLE_SIZE:

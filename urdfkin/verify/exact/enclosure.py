@@ -1,8 +1,8 @@
 """Enclosures: intervals that provably contain the true values of one sample.
 
-Interval arithmetic (`urdfkin.verify.exact.numbers`) evaluates `urdfkin.kinematics.equations` for the decimals
-in the URDF text and the exact values of q, v and a. An enclosure proves a bound on the rounding error. An
-enclosure does not prove that the equations are correct; the comparison with Pinocchio checks the equations.
+Interval arithmetic (`urdfkin.verify.exact.numbers`) evaluates `urdfkin.kinematics.equations`. The inputs are
+the URDF's decimals and the exact values of q, v and a. An enclosure proves a bound on the rounding error. An
+enclosure does not prove that the equations are correct. The comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Interval arithmetic, and a reader of the exact decimals of a URDF text.
 
 An interval consists of a midpoint with many digits, and a radius. The library Arb (python-flint) guarantees
-that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
-triples of intervals.
+that each result contains the true value. This holds for sums, products, quotients, roots, sines and cosines.
+Vectors are triples of intervals.
 
 `read_exact_joints` reads the decimals of a URDF text without rounding them. `urdfkin.urdf.lint` has already
 checked the text.
@@ -51,10 +51,10 @@ _precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joint_count: int) -> int:
-    """Return the number of digits that makes an interval narrower than the last digit of a double.
+    """Return the number of digits for intervals narrower than a double's last digit.
 
-    A joint with an oblique axis makes an interval about twice as wide. Each joint therefore adds one digit,
-    which makes the interval ten times narrower.
+    A joint with an oblique axis makes an interval about twice as wide. Therefore, each joint adds one digit.
+    One digit makes the interval ten times narrower.
     """
     return _BASE_DIGITS + joint_count
 
@@ -63,7 +63,7 @@ def enough_digits(joint_count: int) -> int:
 def precision(digits: int) -> Iterator[None]:
     """Compute with `digits` decimal digits inside a `with` block.
 
-    Arb has one global precision, so only one thread at a time can execute such a block.
+    Arb has one global precision. Therefore, only one thread at a time executes the block.
     """
     with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
@@ -89,11 +89,11 @@ def _round_outward(end: arb, towards: float) -> float:
 
 
 def format_decimal(x: Number, negligible: float) -> str | None:
-    """Return an interval's midpoint as a decimal of 17 digits, or None if the interval is too wide.
+    """Return an interval's midpoint as a decimal of 17 digits. None: the interval is too wide.
 
-    An interval that contains 0 is too wide if its radius is above 1e-10 `negligible`. Otherwise, its decimal
-    is "0". Any other interval is too wide if its radius is above 1e-20 |midpoint|. Otherwise, its decimal
-    differs from the true value by at most 0.501 units of the last digit.
+    An interval with 0 is too wide if its radius > 1e-10 `negligible`. Otherwise, its decimal is "0". An
+    interval without 0 is too wide if its radius > 1e-20 |midpoint|. Otherwise, the decimal's error is at most
+    0.501 units of the last digit.
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]

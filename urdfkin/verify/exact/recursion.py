@@ -1,8 +1,8 @@
-"""The forward recursion of section 7.7, computed with intervals that contain the true values.
+"""The forward recursion of section 7.7, computed with intervals.
 
-The inputs are the URDF's decimals and the exact values of q, v and a. The equations come from
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure only rounding errors;
-the comparison with Pinocchio checks the equations.
+The intervals contain the true values for the URDF's decimals and exact q, v and a. The equations come from
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure only rounding errors.
+The comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def acceleration_values(motion: ExactMotion, link: int, reference: Reference) ->
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the spatial acceleration.
 
-    The linear part is acc - w x vel, or acc - w x vel - alpha x p for WORLD.
+    Linear part: acc - w x vel. For WORLD: acc - w x vel - alpha x p.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
