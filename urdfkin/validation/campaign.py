@@ -1,4 +1,4 @@
-"""Validate robots: compare urdfkin's results with Pinocchio's results, and return a report.
+"""Compare urdfkin's results with Pinocchio's results, and return a report.
 
 The function `validate` splits the work into chunks. An engine runs the chunks.
 """
@@ -291,9 +291,9 @@ class _Campaign:
 
 
 def chunks_of_shard(robots: int, chunking: Chunking, shard: str | None = None) -> list[range]:
-    """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
+    """Return each robot's chunks in a shard such as "2/4", or all chunks without a shard.
 
-    Shards are contiguous, so that most robots are read by one shard only. The numbers of chunks of two shards
+    Shards are contiguous. Therefore, only one shard reads most robots. The numbers of chunks in two shards
     differ by at most one.
 
     >>> chunks_of_shard(2, Chunking(1000), "1/4"), chunks_of_shard(2, Chunking(1000), "4/4")

@@ -1,8 +1,8 @@
-"""Chunks of a validation, and their comparison with Pinocchio; a chunk is a range of samples of one robot.
+"""Compute chunks of a validation: compare urdfkin with Pinocchio.
 
-The robot, the seed, the number of samples and the sample's index determine a sample. Inputs and results of a
-chunk are plain data. Therefore, a chunk can run in this process, in another process or on another machine.
-Samples 0, 1 and 2 of a robot are the neutral configuration, the lower limits and the upper limits.
+A chunk is a range of samples of one robot. A sample depends on the robot, the seed, the number of samples and
+the sample's index. Inputs and results of a chunk are plain data. Therefore, a chunk can run in any process,
+also on another machine. Sample 0 is the neutral configuration, 1 the lower limits, 2 the upper limits.
 
 Each group of 25 random samples has its own seed. Therefore, the size of a chunk does not change any result.
 """
@@ -241,7 +241,7 @@ class _Comparison:
 
 
 class _FrameComparison(_Comparison):
-    """Comparison of a block of frames; a joint belongs to the block of its child link."""
+    """Comparison of a block of frames. A joint belongs to its child link's block."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
@@ -262,9 +262,9 @@ class _FrameComparison(_Comparison):
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Compare each link's result with Pinocchio's results for the link and for its parent joint.
+        """Compare a link's result with Pinocchio's results for link and parent joint.
 
-        Both have the same frame, but Pinocchio has different functions for links and joints.
+        A link and its parent joint have one frame. Pinocchio has different functions for links and joints.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():

@@ -117,7 +117,7 @@ def _connect_client(scheduler: str) -> Iterator[Client]:
 
 
 class _WithoutWebServer:
-    """Scheduler or worker without Dask's web pages, which every user of the machine could read."""
+    """Scheduler or worker without Dask's web pages. Every user of the machine could read the pages."""
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
 
@@ -134,8 +134,8 @@ class _LocalWorker(_WithoutWebServer, Worker):
 def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process, without an open port.
 
-    Dask adds its scratch folder to `sys.path`, where another user could place modules. Therefore, only the
-    current user can access the folder, and the function restores `sys.path`.
+    Dask adds its scratch folder to `sys.path`. Another user could place modules there. Therefore, only the
+    current user can access the folder. The function restores `sys.path`.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -260,7 +260,7 @@ class Cluster:
         return future
 
     def _release_robot(self, robot: int) -> None:
-        """If no chunk of the robot is pending, delete the robot's text on the workers."""
+        """Delete the robot's text on the workers, unless a chunk is pending."""
         self._pending_counts[robot] -= 1
         if not self._pending_counts[robot]:
             del self._pending_counts[robot]

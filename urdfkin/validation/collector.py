@@ -1,7 +1,7 @@
-"""Collect the answers of a run, report the progress, and make the report of each robot.
+"""Collect the answers of a run, report the progress, and make robots' reports.
 
-The results of consecutive chunks are stored as one sum, to save memory. The error statistics in the sum do
-not depend on the order in which the results arrive.
+The results of consecutive chunks are stored as one sum, to save memory. The sum does not depend on the order
+of the results.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
-Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
-and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. Each difference is divided by its scale. A mistake explains the whole result
-under this condition:
+Examples of mistakes are exchanged rows, a wrong frame, and degrees instead of radians. The module applies
+each mistake to urdfkin's results. The changed results are compared with the user's results. Each difference
+is divided by its scale. A mistake explains the whole result under this condition:
 
 `max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000`
 
@@ -51,9 +50,9 @@ class DiagnosisCase:
     """Results of the user's function (`actual`) and of urdfkin (`expected`).
 
     Attributes:
-        inputs: q, or q and v, or q, v and a, in the function's convention.
-        scale: The bound on the rounding error of each number is k * eps * scale.
-        compute: Function that returns urdfkin's results for inputs, a frame and a reference frame.
+        inputs: (q), (q, v) or (q, v, a), in the function's convention.
+        scale: The rounding error of a number is at most k * eps * scale.
+        compute: Returns urdfkin's results for inputs, a frame and a reference frame.
     """
 
     inputs: Inputs
@@ -263,9 +262,9 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, scaled)
 
     def _find_scalar_joints(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, is_angle) of each independent joint with one coordinate.
+        """Return (name, index in q, index in v, is_angle) of each joint with one coordinate.
 
-        The indices are those of the function's convention.
+        Mimic joints are excluded. The indices are those of the function's convention.
         """
         tree = self.robot.tree
         joints = []
@@ -286,7 +285,7 @@ class Mistakes:
     ) -> Inputs:
         """Multiply the entries of some joints by `factor` in the first `count` inputs.
 
-        `indices` contains the index in q, and the index in v and a, of each joint.
+        `indices` contains pairs: index in q, index in v and a.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):

@@ -1,7 +1,7 @@
-"""Types of the JSON document of a validation, and the outcome of a validation run.
+"""Types of a validation's JSON document, and the outcome of a validation.
 
-The JSON schema is generated from these types. Only this module decides whether a run has passed, for new
-reports and for reports that are read from a file.
+The JSON schema is generated from these types. Only this module decides whether a run has passed. This holds
+for new reports and for reports from a file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Compute a quantity with an external program in any language; requests and answers are lines of JSON.
+"""Compute a quantity with an external program. Requests and answers are lines of JSON.
 
 Each request is one line on the program's standard input:
 
@@ -8,14 +8,14 @@ Each request is one line on the program's standard input:
 
 `coordinates` contains the names of the numbers in q. The entries `v` and `a` are present if the quantity
 needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock` (values
-of locked joints), `root_joint` and `convention` are present if the user gave them. The URDF file
-contains neither the values of locked joints nor the root joint. The answer is one line:
+of locked joints), `root_joint` and `convention` are optional. The URDF file does not contain the values of
+locked joints or the root joint. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
-The program runs with the rights of the user who starts it. If the program hangs, ends or gives an invalid
-answer, the call raises `ProgramError` and stops the program. The next call starts the program again. After
-three consecutive failures, the program is not started again. An answer with the entry `error` raises
+The program runs with the rights of the user who starts it. The program may hang, end or give an invalid
+answer. Then the call raises `ProgramError` and stops the program. The next call starts the program again.
+After three consecutive failures, the program is not started again. An answer with the entry `error` raises
 `ProgramError`, but does not stop the program.
 """
 
@@ -189,7 +189,7 @@ class Program:
                 stream.close()
 
     def _request_answer(self, request: bytes) -> bytes:
-        """Write and read at the same time, because a program may answer before it has read the request."""
+        """Write and read at the same time. A program may answer before it has read the request."""
         process = self._process
         assert process is not None
         assert process.stdin is not None

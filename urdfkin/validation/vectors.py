@@ -1,11 +1,10 @@
-"""Write test vectors: configurations of a robot, and the results that a correct program computes for them.
+"""Write test vectors: configurations of a robot, and their correct results.
 
 The results are computed with at least 50 digits, and written with 17 digits. Each number has a tolerance.
-Test vectors name the robot's URDF file and the file's SHA-256. If the robot is not in the catalogue, its URDF
-file is written too. The file `robots/features.toml` defines small robots, each with one feature of URDF. All
-values are computed from the decimal numbers in the URDF. Configurations are computed from SHA-256 digests of
-the robot's name, the names of joints and indices. Therefore, the vectors depend only on the URDF and the
-robot's name.
+Test vectors name the robot's URDF file and the file's SHA-256. For a robot outside the catalogue, the URDF
+file is written too. The file `robots/features.toml` defines small robots, each with one feature of URDF.
+Results are computed from the decimals in the URDF. Configurations are computed from SHA-256 digests of names
+and indices. Therefore, the vectors depend only on the URDF and the robot's name.
 """
 
 from __future__ import annotations
@@ -251,7 +250,7 @@ def make_configuration(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q, v and a of a sample.
 
-    The numbers depend only on the sample's index, and on the robot's name, joints and limits.
+    The numbers depend only on the sample's index and the robot's name, joints and limits.
     """
     q, ranges = neutral(tree), coordinate_ranges(tree)
     for joint, start in zip(tree.joints, tree.q_index, strict=True):
@@ -337,7 +336,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
     """Write the test vectors of the robot's default tip.
 
-    If the robot is not in the catalogue, the function also writes the URDF.
+    For a robot outside the catalogue, the function also writes the URDF.
     """
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
@@ -437,7 +436,7 @@ def _compute_results(
 ) -> Iterator[dict[str, Any]]:
     """Compute results with intervals of `digits` digits.
 
-    An entry of `value` is None if its interval is too wide for `format_decimal`.
+    `value` has None for an interval too wide for `format_decimal`.
     """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:

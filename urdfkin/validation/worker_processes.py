@@ -1,12 +1,12 @@
 """Engine that runs chunks in processes of this machine.
 
-The crash of a process affects only the robot that this process validates. A worker process is a new Python
-interpreter. A worker does not import the parent's main module, so a script needs no `__main__` guard. A
-worker has one chunk at a time, so each crash can be attributed to a robot.
+A crash of a process affects only the process's robot. A worker process is a new Python interpreter. A worker
+does not import the parent's main module. Therefore, a script needs no `__main__` guard. A worker has one
+chunk at a time, so the robot of a crash is known.
 
-If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
-separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
-a separate process from the start, and is reported as not verified after the first crash.
+After a crash, the same chunk and the robot's remaining chunks run again: after all other robots, in a
+separate process. After a second crash, the robot is not verified. With `isolate`, each robot has a separate
+process from the start. After one crash, the robot is not verified.
 """
 
 from __future__ import annotations
@@ -138,8 +138,8 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    With `crash_reason`, each process validates one robot, and a crash is reported with this reason. Without
-    `crash_reason`, a process can validate several robots.
+    With `crash_reason`, each process validates one robot. `crash_reason` is the reason in the report of a
+    crash. Without `crash_reason`, a process can validate several robots.
     """
 
     def __init__(
