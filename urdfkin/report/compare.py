@@ -17,7 +17,7 @@ A change is a regression in these cases:
 - The worst disagreement or the largest ratio is infinite only in the new report.
 
 A changed model is not a regression. The comparison lists changes of a joint's axis, placement, limits and
-mimic rule. A renamed file is not a regression: robots are matched by the robot name in the file.
+mimic rule. A renamed file is not a regression. Robots are matched by the robot name in the file.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ _DISPLAY_TOLERANCE = Tolerance(1e-9, 1e-9)
 
 
 def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Iterator[tuple[str, str, str]]:
-    """Yield name, old value and new value of each change; a missing value is empty."""
+    """Yield (name, old value, new value) of each change. A missing value is empty."""
     before, after = _joints(old), _joints(new)
     for name in dict.fromkeys([*before, *after]):
         was, now = before.get(name), after.get(name)
@@ -253,7 +253,7 @@ class ChangeEntry(TypedDict):
 class ComparisonDocument(Header):
     """The output of `urdfkin report compare --format json`.
 
-    The header entry `sha256` contains the SHA-256 of each robot's text in the new report.
+    The entry `sha256` has the SHA-256 of each robot's text in the new report.
     """
 
     changes: Annotated[list[ChangeEntry], doc("All changes between the two reports.")]
@@ -326,9 +326,9 @@ def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
 def find_renamed_files(
     before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
 ) -> dict[str, str]:
-    """Return the new source of each robot with a renamed file, by the old source.
+    """Return the new source of each renamed file, by the old source.
 
-    A file counts as renamed if its robot name has exactly one removed source and exactly one added source.
+    For a renamed file, the robot name has one removed and one added source.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

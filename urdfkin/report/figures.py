@@ -1,8 +1,8 @@
 """Histograms of the disagreements with Pinocchio, and the data of the 3D view.
 
 The plot has one row for each quantity, with all reference frames together. The x axis is logarithmic and
-shows the disagreement in eps * scale. A triangle shows the worst result. Results have different bounds, so a
-horizontal bar shows the interval from the smallest to the largest bound.
+shows the disagreement in eps * scale. A triangle shows the worst result. Results have different bounds. A
+horizontal bar shows the interval of the bounds.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _BAR_HEIGHT = 0.82
 
 
 def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> str:
-    """Return the plot of one robot as inline SVG, or an empty text if nothing was compared."""
+    """Return the plot of one robot as inline SVG. Empty text: nothing was compared."""
     names = quantities([robot])
     if not names:
         return ""

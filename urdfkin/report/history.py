@@ -1,8 +1,8 @@
-"""History of robots in several validation reports: verdicts, results, findings and changes from run to run.
+"""History of robots in several reports: verdicts, results, findings, changes.
 
-Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed.
-Each report is read twice: first for the start time, and then for the results. Therefore, few reports are in
-memory at the same time.
+Runs are ordered by start time. Robots are matched by source, or by name after a renaming of the file. Each
+report is read twice: for the start time, then for the results. Therefore, few reports are in memory at the
+same time.
 """
 
 from __future__ import annotations
@@ -105,7 +105,10 @@ class Unused(TypedDict):
 
 
 class HistoryDocument(Header):
-    """The output of `urdfkin report history --format json`, with verdict and `sha256` of the latest run."""
+    """The output of `urdfkin report history --format json`.
+
+    The verdict and `sha256` are those of the latest run.
+    """
 
     runs: Annotated[list[ValidationRun], doc("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], doc("The robots; worse verdicts first.")]
@@ -199,7 +202,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
 
 
 def _reports_in_folder(folder: Path) -> Iterator[Path]:
-    """Yield the reports in a folder, ordered by name; links to folders are not followed."""
+    """Yield the reports in a folder, ordered by name. Links to folders are not followed."""
     seen = 0
     for place, folders, names in os.walk(folder):
         here = Path(place)
@@ -281,7 +284,7 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
 
 
 def _add_robots(history: History, before: Document | None, document: Document) -> None:
-    """Add the robots of the latest run; the history of a renamed file continues under the new name.
+    """Add the robots of the latest run. A renamed file's history continues under the new name.
 
     If the new name already has a history, this history continues.
     """

@@ -1,4 +1,4 @@
-"""Accuracy study: errors of urdfkin and Pinocchio relative to values with fifty digits.
+"""Accuracy study: errors relative to values with at least fifty digits.
 
 Each value with fifty digits is an interval that contains the true value. Therefore, no error is
 underestimated. Errors are multiples of eps * scale, as in a validation report.

@@ -234,8 +234,7 @@ class Mistakes:
             yield "the result is transposed", partial(case.expected.swapaxes, 1, 2)
         if len(shape) == 3:
             yield (
-                "the last two axes are exchanged; entry (row, i, j) must be the derivative of column i"
-                " in the direction of joint velocity j",
+                "the last two axes are exchanged; entry (row, i, j) must be dJ[row, i]/dq[j]",
                 partial(case.expected.swapaxes, 2, 3),
             )
 

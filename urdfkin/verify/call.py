@@ -173,7 +173,7 @@ def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
         return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator.
     except TypeError:
         raise InputError(
-            "a frame must be the name of a link or joint, or a list of such names",
+            "a frame must be a name of a link or joint, or a list of names",
             found=safe_repr(frame),
             remedy="robot.link_frames lists all links",
         ) from None
