@@ -328,7 +328,7 @@ def find_renamed_files(
 ) -> dict[str, str]:
     """Return the new source of each renamed file, by the old source.
 
-    For a renamed file, the robot name has one removed and one added source.
+    A renamed file: the robot name has one removed and one added source.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

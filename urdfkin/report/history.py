@@ -161,7 +161,7 @@ class History:
 def read_history(paths: Sequence[Path]) -> History:
     """Read reports, folders of `validate --store`, and folders that contain reports.
 
-    Raise InputError if no report is usable, or if there are too many reports or files.
+    Raise InputError for no usable report, too many reports or too many files.
     """
     history = History()
     before: Document | None = None

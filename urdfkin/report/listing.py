@@ -30,7 +30,7 @@ def print_document(out: Console, document: TextDocument) -> None:
 def print_table(out: Console, table: Table) -> None:
     """Print a table.
 
-    A name wider than the first column has its own line above the other cells.
+    A name wider than the first column has its own line.
     """
     from rich.cells import cell_len
 

@@ -166,7 +166,7 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 def describe_as_written(sameness: Sameness) -> str:
     """Describe the largest distance between matching frames of A and the unchanged B.
 
-    The text is empty if the distance is a rounding error, or if `sameness.after` is empty.
+    The text is empty for a rounding error, or if `sameness.after` is empty.
     """
     frame = sameness.as_written
     off = "" if frame is None else _describe_distance(frame, sameness.rounding)
@@ -176,7 +176,7 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text has nonzero coordinates: of model A, and of unmatched joints of model B.
+    The text has the nonzero coordinates of A, and of B's unmatched joints.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -413,11 +413,11 @@ def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Seq
 def pictures(
     sameness: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
 ) -> list[dict[str, Any]]:
-    """Draw the skeletons of A and B in two views, and a close view of the worst frame.
+    """Draw two views of both skeletons, and a close view of the worst frame.
 
     Without `worst`, A is in its zero configuration, B in the matching configuration. With `written`, the base
-    of B has its pose in the file. Without `written`, the base of B has the pose `sameness.base`, which brings
-    B closest to A. A line segment has four numbers: x, y of the start, x, y of the end.
+    of B has its pose in the file. Otherwise, the base of B has the pose `sameness.base`, nearest to A. A line
+    segment has four numbers: x, y of the start, x, y of the end.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -450,7 +450,7 @@ def pictures(
 
 
 def _skeleton_lines(robot: Robot, Ts: FloatArray) -> FloatArray:
-    """Return lines (joints, 2, 3) from each parent link's origin to the child link's origin."""
+    """Return lines (joints, 2, 3) between the origins of parent and child links."""
     ends = [(Ts[joint.parent, :3, 3], Ts[i + 1, :3, 3]) for i, joint in enumerate(robot.tree.joints)]
     return np.array(ends).reshape(-1, 2, 3)
 

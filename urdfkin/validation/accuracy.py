@@ -102,11 +102,10 @@ def accuracy_study(
 ) -> AccuracyStudy:
     """Compute the errors of urdfkin and Pinocchio, relative to values with fifty digits.
 
-    `base`: motion of the root link, one for all samples or one for each sample. Without `base`, the root link
-    is fixed.
+    `base`: one motion of the root link, or one for each sample. Without `base`, the root link is fixed.
 
-    Pinocchio computes no analytical Jacobians. Therefore, the study uses eq. 7.122 twice: with the rotation
-    matrix and Jacobian of urdfkin, and with those of Pinocchio.
+    Pinocchio computes no analytical Jacobians. Therefore, the study evaluates eq. 7.122 with urdfkin's
+    rotation and Jacobian, and with Pinocchio's.
 
     Raises:
         InputError: The number of motions in `base` is wrong.
@@ -221,7 +220,7 @@ class _AccuracyBatch:
 
 
 def _find_nonzero_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices (n, links, m) of each sample's and link's nonzero columns.
+    """Return the indices (n, links, m) of nonzero columns, by sample and link.
 
     m is the largest number of nonzero columns. Indices of zero columns fill shorter rows.
     """

@@ -1,8 +1,8 @@
 """Compute chunks of a validation: compare urdfkin with Pinocchio.
 
-A chunk is a range of samples of one robot. A sample depends on the robot, the seed, the number of samples and
-the sample's index. Inputs and results of a chunk are plain data. Therefore, a chunk can run in any process,
-also on another machine. Sample 0 is the neutral configuration, 1 the lower limits, 2 the upper limits.
+A chunk is a range of samples of one robot. A sample depends on robot, seed, number of samples and index.
+Inputs and results of a chunk are plain data. Therefore, a chunk can run in any process, also on another
+machine. Sample 0 is the neutral configuration, 1 the lower limits, 2 the upper limits.
 
 Each group of 25 random samples has its own seed. Therefore, the size of a chunk does not change any result.
 """

@@ -164,7 +164,7 @@ class ReportedFinding(TypedDict):
 
 
 class ReportedDHRow(TypedDict):
-    """The constant parameters of a row of a Denavit-Hartenberg table, in metres and radians."""
+    """Constant parameters of a Denavit-Hartenberg row, in metres and radians."""
 
     joint: Annotated[str, doc("Name of the joint.")]
     kind: Annotated[Literal["revolute", "continuous", "prismatic"], doc("Kind of the joint.")]
@@ -246,7 +246,7 @@ class ReportedAccuracyLine(TypedDict):
 
 
 class ReportedAccuracy(TypedDict):
-    """Result of the accuracy study: differences of urdfkin and Pinocchio from values with fifty digits."""
+    """Result of the accuracy study: errors relative to values with fifty digits."""
 
     robot: Annotated[str, doc("The robot's name.")]
     samples: Annotated[Count, doc("Number of configurations in the accuracy study.")]
@@ -288,7 +288,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """For each library, the number of results in which it differs from two libraries that agree."""
+    """Number of outliers of each library. The two other libraries agree."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -361,7 +361,7 @@ class ReportedTimings(TypedDict):
 
 
 class ReportedSecondReading(TypedDict):
-    """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
+    """Comparison of links and joints: urdfkin and yourdfpy read the same text."""
 
     by: Annotated[str, doc("Name and version of the second URDF parser, yourdfpy.")]
     joints: Annotated[Count, doc("Number of compared joints, fixed joints included.")]

@@ -6,7 +6,7 @@ remaining chunks. The engine must run all other chunks. Tasks are created on dem
 tasks take little memory.
 
 `WorkQueue` gives different workers different robots. Therefore, only one worker reads most robots. If no
-robot is waiting, a free worker joins the robot whose latest chunk has the lowest index.
+robot is waiting, a free worker joins another robot. The joined robot's latest chunk has the lowest index.
 """
 
 from __future__ import annotations

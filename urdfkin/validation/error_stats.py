@@ -5,8 +5,8 @@ associative. Therefore, the sum does not depend on the chunks. The worst case of
 its terms.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
-bound. For Pinocchio and the second oracle, the bound is the sum of the other two bounds. A result is the
-outlier if only the two other results agree.
+bound. bound(Pinocchio, second oracle) = sum of the other two bounds. A result is the outlier if only the two
+other results agree.
 """
 
 from __future__ import annotations

@@ -261,8 +261,8 @@ def verify_function(
     The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
     quantities, and v (nv,) and a (nv,) for some quantities. Without `convention`, the units are rad, m and s.
     The values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect.
-    Exceptions and wrong shapes are reported, and do not end the check.
+    eighth sample, v and a are a hundred times larger. Quadratic terms then have a visible effect. Exceptions
+    and wrong shapes are reported, and do not end the check.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -276,9 +276,9 @@ def verify_function(
         samples: Number of random configurations.
         seed: Seed of the random configurations.
         factor: The allowed difference is the bound on rounding errors times this factor. The bound is derived
-            for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
-            errors. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared
-            results agree with urdfkin's.
+            for a recursion from joint to joint. For a method with larger rounding errors, give a factor above
+            1. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared results agree
+            with urdfkin's.
         batch: If True, the function computes n configurations in one call, and returns n results. The
             function receives q (n, nq), v (n, nv) and a (n, nv).
         **options: Further arguments of the `Robot` method that computes the quantity, such as

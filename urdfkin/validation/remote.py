@@ -2,7 +2,7 @@
 
 Dask's worker computes nothing. The worker runs chunks in child processes. A robot can crash a child process,
 but not the worker. After a crash, the worker runs the chunk again in a new process. After a second crash, the
-robot is "not verified"; the reason is the signal or exit status. Chunks and answers are transferred as bytes.
+robot is "not verified". The reason is the signal or exit status. Chunks and answers are transferred as bytes.
 A chunk does not contain the text of the robot. The text is sent separately, and not again with every chunk.
 """
 

@@ -230,7 +230,7 @@ class Store:
                 self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
     def count_chunks(self) -> dict[int, tuple[int, bool]]:
-        """Return a pair for each robot: number of chunks with a result, whether a chunk failed."""
+        """Return (number of chunks with a result, whether a chunk failed) for each robot."""
         names = {path.name for kind in (_DONE, _FAILED) for path in self._find_files(kind)}
         counts = {}
         for robot in range(len(self.manifest.robots)):

@@ -2,9 +2,9 @@
 
 A crash of a process affects only the process's robot. A worker process is a new Python interpreter. A worker
 does not import the parent's main module. Therefore, a script needs no `__main__` guard. A worker has one
-chunk at a time, so the robot of a crash is known.
+chunk at a time. A crash therefore belongs to one robot.
 
-After a crash, the same chunk and the robot's remaining chunks run later: after all other robots, in a
+After a crash, the same chunk and the robot's remaining chunks wait for all other robots. Then they run in a
 separate process. After a second crash, the robot is not verified. With `isolate`, each robot has a separate
 process from the start. After one crash, the robot is not verified.
 """

@@ -7,7 +7,7 @@ a virtual environment with one library:
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}`. It prints one line of JSON for each
-case. `text` is a URDF text, or the path of an MJCF or USD file. A configuration maps the name of each
+case. `text`: a URDF text, or the path of an MJCF or USD file. A configuration maps the name of each
 independent joint to the joint's value:
 
 | Joint | Value |

@@ -8,14 +8,14 @@ A result is accepted if no number differs from the oracle's number by more than 
     joints = number of URDF joints on the path + 1, or + 2 for a rotated base
     tilt = sum of the tilts of these joints, rad (`urdfkin.kinematics.roundings`)
 
-*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of their absolute values, and
-has the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel. The
-scale can be broadcast to the shape of the results.
+*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute terms. The
+scale has the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel.
+The scale can be broadcast to the shape of the results.
 
-*Number k.* The number k is the allowed number of rounding errors, to first order in eps
-(`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. Rotations do
-not amplify errors, so the error of a number grows linearly with the number of joints. Pinocchio replaces an
-axis near a coordinate axis by the coordinate axis. The tilt is the angle between both axes.
+*Number k.* k is the allowed number of rounding errors (`urdfkin.kinematics.roundings`). k counts only
+first-order errors in eps. Each joint on the path adds a fixed number of rounding errors. Rotations do not
+amplify errors. Therefore, errors grow linearly with the number of joints. Pinocchio replaces an axis near a
+coordinate axis by the coordinate axis. The tilt is the angle between these two axes.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -34,11 +34,11 @@ rounding error:
 | LOCAL | rotation into the frame's axes |
 | WORLD | cross product with the frame's position p |
 
-In measurements, each joint adds less than eps * scale to a difference, because rounding errors rarely all
-have the same sign. Reports state each difference as a multiple of eps * scale.
+In measurements, each joint adds less than eps * scale to a difference. Rounding errors rarely all have the
+same sign. Reports state differences in multiples of eps * scale.
 
-*Magnitudes.* `compute_magnitudes` evaluates the equations 7.58 and 7.127 to 7.130 with lengths instead of
-vectors (`urdfkin.kinematics.number_kinds`). No length is negative, so no intermediate value exceeds the
+*Magnitudes.* `compute_magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with lengths instead of vectors
+(`urdfkin.kinematics.number_kinds`). No length is negative. Therefore, no intermediate value exceeds the
 result.
 
 *Angular acceleration.* The bound on alpha contains w_i instead of w_{i-1}:

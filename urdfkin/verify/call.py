@@ -51,7 +51,7 @@ class Call:
     Args:
         plan: Compiles the tree for link indices.
         q_v_a: (q,), (q, v) or (q, v, a).
-        additional_frames: Frames that the call computes, but that are not part of the result.
+        additional_frames: Computed frames that are not part of the result.
         options: Arguments of a quantity, for example `gravity`.
     """
 

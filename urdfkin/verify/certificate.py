@@ -110,7 +110,7 @@ class LineEntry(TypedDict):
 
 
 class CertificateDocument(Header):
-    """A saved certificate as plain data: the checked and the unchecked results of a robot."""
+    """A saved certificate as plain data: a robot's checked and unchecked results."""
 
     robot: Annotated[str, doc("The robot's name.")]
     source: Annotated[

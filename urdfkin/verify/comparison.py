@@ -86,8 +86,8 @@ def bound_ratios(units: FloatArray, k: FloatArray) -> FloatArray:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf if a number or its scale is inf or NaN. For unequal numbers with a scale of 0, the
-    result is inf too.
+    The result is inf for inf or NaN in a number or scale. For unequal numbers with a scale of 0, the result
+    is inf too.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, SMALLEST_SUBNORMAL), 0.0)
     difference = np.abs(ours - theirs)

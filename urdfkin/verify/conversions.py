@@ -9,12 +9,11 @@
 | `check_table_source` | Pinocchio's placements of the tip with the product of a table's matrices (eq. 7.64) |
 | `check_model_source` | placements of all links with the placements of a `pinocchio.Model` |
 
-`check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
-cannot check the robot.
+`check_chain`, `check_opw` and `check_screws` return a line of text. None: Pinocchio cannot check the robot.
 
-For a table or a `pinocchio.Model`, urdfkin writes a URDF text. urdfkin and Pinocchio compute from this text,
-so a comparison of their results cannot find an error in the text. Therefore, `check_table_source` and
-`check_model_source` compare with the table or the model.
+For a table or a `pinocchio.Model`, urdfkin writes a URDF text. Both urdfkin and Pinocchio read this text.
+Therefore, equal results do not show that the text is correct. `check_table_source` and `check_model_source`
+compare with the table or the model.
 """
 
 from __future__ import annotations
@@ -164,7 +163,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
 def _sample_base_and_tip(
     verifier: Verifier, base: str, tip: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return random q (n, nq), and Pinocchio's placements (n, 4, 4) of the base and of the tip."""
+    """Return random q (n, nq), and Pinocchio's placements (n, 4, 4) of base and tip."""
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
     T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
     return q, T[:, 0], T[:, 1]
@@ -178,8 +177,8 @@ def check_orientations(
     The function compares rotation matrices. Angles at gimbal lock and signs of quaternions are not unique.
     The bound includes the rounding errors of `R`.
 
-    `orientations` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
-    `make_command(k)` returns a command that computes sample k again.
+    `orientations`: roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last. `make_command(k)`
+    returns a command that computes sample k again.
     """
     pin = pinocchio()
     if orientations.shape[-1] == 3:

@@ -160,8 +160,8 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 def coupling(full, columns, index, factor, out):
     """Add Jacobian columns of mimic joints.
 
-    `factor[i]` * (column i of `full`) is added to column `index[i]` of the sum. `out` contains the rows of
-    the sum, one after the other.
+    `factor[i]` * full[:, i] is added to column `index[i]` of the sum. `out` contains the rows of the sum, one
+    after the other.
     """
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):

@@ -4,9 +4,9 @@ MuJoCo's own parser reads the origins and axes of joints from the URDF text. Unl
 MuJoCo computes with unit quaternions. MuJoCo's six-vectors refer to a centre of mass. This module changes the
 text before MuJoCo reads the text:
 
-- Each link becomes a body without meshes. In the compiled model, only the root has a mass.
-  The centre of mass, to which MuJoCo's results refer, is therefore the root's origin.
-- Links and joints get numbers as names, because MuJoCo reserves some names.
+- Each link becomes a body without meshes. In the compiled model, only the root has a mass. Therefore,
+  MuJoCo's centre of mass is the root's origin.
+- Links and joints get numbers as names. MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint. MuJoCo's free joint can only connect a body to
   the world. A planar joint becomes two slide joints and a hinge.
 - Mimic rules are removed. MuJoCo would convert mimic rules to constraints. MuJoCo's kinematics ignores
@@ -14,7 +14,7 @@ text before MuJoCo reads the text:
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. S' is the time derivative of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. S also
-rotates the linear velocity of a floating or planar joint: urdfkin's velocity is in the child link's axes,
+rotates the linear velocity of a floating or planar joint. urdfkin's velocity is in the child link's axes.
 MuJoCo's slide velocities are in the joint frame's axes. The angular velocities are equal.
 """
 

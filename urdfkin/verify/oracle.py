@@ -661,8 +661,8 @@ def couple_columns(
 ) -> FloatArray:
     """Return J_full G. The kernel and NumPy return identical results.
 
-    Each i in `columns` adds `factor[i]` * (column i of J_full) to column `index[i]`. The order of `columns`
-    is the order of the additions.
+    Each i in `columns` adds `factor[i]` * J_full[:, i] to column `index[i]`. The order of `columns` is the
+    order of the additions.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:

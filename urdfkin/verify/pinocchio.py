@@ -342,12 +342,12 @@ class PinocchioOracle(Oracle):
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Pinocchio's Hessians, with two errors of Pinocchio 4.1 corrected.
+        """Return Pinocchio's Hessians. Two errors of Pinocchio 4.1 are corrected.
 
         - Pinocchio's array has C order, but the numbers have Eigen's order. In Eigen's order, the first index
           varies fastest.
         - In LOCAL, Pinocchio's derivative of a column by the same joint's coordinate can be nonzero. The true
-          derivative is 0: in the frame's axes, a joint's motion does not change its own columns.
+          derivative is 0. In the frame's axes, a joint's motion does not change its columns.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, reference, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv

@@ -240,7 +240,7 @@ def compute_relative_motion(
 class ErrorScales:
     """Lengths, sums of |v| and |a|, and relative errors, for the bounds on rounding errors.
 
-    The sums include all joints on two paths: from the root to the table's base, and to the tip.
+    The sums include all joints on the paths from the root to base and tip.
 
     Attributes:
         reach: (n,) length L of the module's docstring, m.

@@ -406,7 +406,7 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    The bound is constant for a quantity of q, a fixed base and revolute joints.
+    For revolute joints, a fixed base and a quantity of q, the bound is constant.
     """
     v, a = (*x.rates, None, None)[:2]
     is_constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0

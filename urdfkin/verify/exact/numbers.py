@@ -283,7 +283,7 @@ class _ExactText:
         return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
     def resolve_rule(self, name: str) -> tuple[Number, Number]:
-        """Return M and C of the joint's value M q + C, with q of the independent joint."""
+        """Return (M, C). The joint's value is M q + C for the independent joint's q."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -346,7 +346,7 @@ class _ValueBound(NamedTuple):
     Attributes:
         scaled_coordinate: |M q|.
         offset: Sum of the absolute values of the terms of C.
-        error: Rounding error, in eps, of a program that applies the rules one after the other.
+        error: Rounding error (eps) of a program that applies one rule after another.
     """
 
     scaled_coordinate: Any
