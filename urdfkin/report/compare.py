@@ -12,8 +12,8 @@ A change is a regression in these cases:
 - A quantity or a table is no longer compared.
 - There are fewer samples or fewer results.
 - A bound is wider, although the robot has the same joints.
-- The worst disagreement grew by more than a given factor, and exceeds the error of a single rounding.
-- The largest ratio of a disagreement to its bound grew by more than this factor, and exceeds 0.1.
+- The worst disagreement grew by more than a given factor, and exceeds 2 eps * scale.
+- The largest ratio (disagreement / bound) grew by more than this factor, and exceeds 0.1.
 - The worst disagreement or the largest ratio is infinite only in the new report.
 
 A changed model is not a regression. The comparison lists changes of a joint's axis, placement, limits and

@@ -149,7 +149,7 @@ class ChunkResult:
 
 @dataclass(frozen=True, slots=True)
 class Chunking:
-    """Division of each robot's samples into chunks, which depends only on the number of samples.
+    """Division of samples into chunks. It depends only on the number of samples.
 
     >>> len(Chunking(1000)), len(Chunking(10_000)), len(Chunking(1_000_000)), len(Chunking(0))
     (8, 10, 1000, 1)

@@ -6,8 +6,8 @@ is divided by its scale. A mistake explains the whole result under this conditio
 
 `max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000`
 
-If no mistake explains the whole result, single columns of a Jacobian are searched for mistakes. The last step
-combines each mistake with exchanged linear and angular rows. At most three mistakes are reported.
+If no mistake explains the whole result, each Jacobian column is searched. The last step combines each mistake
+with exchanged linear and angular rows. At most three mistakes are reported.
 """
 
 from __future__ import annotations

@@ -10,9 +10,8 @@
     DIR/.writing/                  unfinished files
     DIR/damaged/                   damaged and unknown files
 
-The manifest defines the robots, the samples, the versions, the chunks and the key of each chunk. The key is
-the sha256 of all data that determine the chunk's numbers. Therefore, results of older code, texts or options
-are never reused.
+The manifest defines robots, samples, versions, chunks and chunk keys. A key is the sha256 of all data that
+determine the chunk's numbers. Therefore, results of older code, texts or options are never reused.
 
 Files are written atomically: a file is complete or absent. A file's name contains the key of its chunk. The
 store reports damaged files, and files of no known chunk. A writable store moves these files to the folder

@@ -1,6 +1,6 @@
 """Bounds on the difference between two correct computations of a quantity.
 
-A result is accepted if no number differs from the oracle's number by more than this bound:
+In an accepted result, each difference from the oracle's number is at most:
 
     k * eps * scale
     eps = 2^-52
@@ -47,7 +47,7 @@ result.
     Pinocchio:   v_i w_i x z
     difference:  v_i^2 z x z = 0, except for rounding errors
 
-The rounding errors of z x z are large for fast joints with an oblique axis.
+Fast joints with an oblique axis have large rounding errors of z x z.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Compare results of urdfkin and an oracle, in eps * scale and as a fraction of the bound.
+"""Compare results of urdfkin and an oracle, in eps * scale.
 
 `disagreement` defines the difference of two numbers. NumPy's differences take as long as Pinocchio's results.
 Therefore, a compiled kernel replaces NumPy after some time (`urdfkin.compiled.preload`). The kernel and NumPy

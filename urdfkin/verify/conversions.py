@@ -1,4 +1,4 @@
-"""Check a robot's chains, solvers and orientations with Pinocchio, and robots made of tables or models.
+"""Check chains, solvers, orientations and converted robots with Pinocchio.
 
 | Function | Compared |
 |---|---|

@@ -124,9 +124,8 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     The compiler can vectorize the maximum of integers, but not of doubles.
 
     - `scale`: the rows repeat if `scale` is shorter than `out`
-    - `out`: largest difference in each row, in units of eps * scale; inf if a number or a scale is inf or NaN
-    - `unit`, `units`: working memory, as large as `scale` and as one row of `scale`;
-      used only if the rows repeat
+    - `out`: largest difference in each row, in eps * scale; inf for inf or NaN
+    - `unit`, `units`: working memory for repeated rows; sizes: `scale`, one row of `scale`
     - `out_bits`, `bits`: views of `out` and `units` as integers
     """
     is_known_finite = has_triples = len(scale) < len(out)

@@ -1,11 +1,11 @@
 """Compile an MJCF file with MuJoCo and Pinocchio, in a separate process.
 
-A few lines of MJCF can require any amount of time and memory, or crash a parser. Examples are nested
-`<replicate>` and `nuser_body`. The process reads a request from standard input. The process writes each
-answer as a line of JSON:
+A few lines of MJCF can require any amount of time and memory. They can also crash a parser. Examples are
+nested `<replicate>` and `nuser_body`. The process reads a request from standard input. The process writes
+each answer as a line of JSON:
 
 1. the robot, compiled without shapes and inertias
-2. the robot, compiled from the complete file, or the reason why MuJoCo does not compile this file
+2. the robot, compiled from the complete file, or MuJoCo's reason for an error
 3. the placements of the bodies by Pinocchio's reader
 
 A request without samples gets no third answer. It gets the second answer only if MuJoCo aligns a free body

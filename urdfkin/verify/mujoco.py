@@ -14,8 +14,8 @@ text before MuJoCo reads the text:
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. S' is the time derivative of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. S also
-rotates the linear velocity of a floating or planar joint. urdfkin's velocity is in the child link's axes.
-MuJoCo's slide velocities are in the joint frame's axes. The angular velocities are equal.
+rotates the linear velocity of a floating or planar joint. In urdfkin, this velocity is in the child link's
+axes. In MuJoCo, slide velocities are in the joint frame's axes. The angular velocities are equal.
 """
 
 from __future__ import annotations

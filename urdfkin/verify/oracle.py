@@ -1,7 +1,7 @@
 """Base class of the oracles Pinocchio and MuJoCo.
 
-An oracle is a library. urdfkin compares its own results with the oracle's results. This module also converts
-the user's arguments for the oracle. urdfkin converts the arguments for its own computation with other code.
+An oracle is a library with independent results, for a comparison with urdfkin's results. This module also
+converts the user's arguments for the oracle. Other code converts the arguments for urdfkin's own computation.
 The two conversions share only the code for units and named poses. A wrong broadcast, order or name in one
 conversion therefore causes a disagreement.
 
@@ -20,9 +20,9 @@ Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuo
 number. A planar joint has three, a floating joint seven, and a mimic joint none.
 
 Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation
-nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`). This module uses
-Davenport's q-method. The quaternion q of R maximizes q^T K q = trace(R(q)^T M). Therefore, q is the
-eigenvector of K for the largest eigenvalue.
+nearest to M. For R, `urdfkin.kinematics.rotation` uses one Newton step. This module uses Davenport's
+q-method. The quaternion q of R maximizes q^T K q = trace(R(q)^T M). Therefore, q is the eigenvector of K for
+the largest eigenvalue.
 """
 
 from __future__ import annotations

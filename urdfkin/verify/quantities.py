@@ -1,7 +1,7 @@
 """The table of quantities: names, shapes, functions, bounds and help texts.
 
-Methods of `Robot`, checks, reports and the command line use the table. The table names functions by text and
-imports them at their first use, so that `--help` does not import NumPy.
+Methods of `Robot`, checks, reports and the command line use the table. Functions in the table are imported at
+their first use. Therefore, `--help` does not import NumPy.
 
 >>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)

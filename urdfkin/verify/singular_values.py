@@ -15,9 +15,9 @@
 
     error of a sum of m products <= m eps * (sum of the absolute values of the products)
 
-*Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. Before
-a norm is computed, all numbers are divided by the largest number. Products are computed from mantissas and
-exponents. If the residual overflows, the bounds are 0 and inf.
+*Range.* Intermediate norms and products stay within the range of doubles. Before a norm is computed, all
+numbers are divided by the largest number. Products are computed from mantissas and exponents. If the residual
+overflows, the bounds are 0 and inf.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ motion of b and of t in the world, and r = p_t - p_b:
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module has
-its own code for the equations. The table's results come from `urdfkin.kinematics.equations`.
+These are eq. 7.124 and 7.125, solved for the relative motion. This module has its own code for the equations.
+The table's results come from `urdfkin.kinematics.equations`.
 
 *Bound.* The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping may have rounded
 angles of the table to multiples of 15 degrees. The bound includes the change of the angles. The bound on
@@ -23,12 +23,11 @@ linear rows grows with a length L:
     S > reach:  L = min(S, MAX_LENGTH_RATIO * reach)
     Hayati rows: no length in the table exceeds MAX_LENGTH_RATIO * reach (docs/dh.md)
 
-*Mimic joints.* A coordinate and its mimic joints move together. The bound on their Jacobian column is
-proportional to the sum of their absolute multipliers.
+*Mimic joints.* A coordinate and its mimic joints move together. The bound on a Jacobian column is
+proportional to the sum of the joints' absolute multipliers.
 
 *Loss.* Without a Hayati row, nearly parallel axes can need table lengths of kilometres. If two long lengths
-cancel, the tip's error is eps times the lengths. urdfkin accepts this error. `TableCheck.loss` states the
-error.
+cancel, the tip's error is eps times the lengths. `TableCheck.loss` states the error, which urdfkin accepts.
 """
 
 from __future__ import annotations
