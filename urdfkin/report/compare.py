@@ -188,10 +188,10 @@ def _units_cell(value: Units | str) -> str:
 #: A regression: new disagreement > GROWTH_FACTOR * old disagreement.
 #: Other random samples cause smaller growth.
 GROWTH_FACTOR = 2.0
-#: Smaller new disagreements (eps * scale) are no regressions.
+#: New disagreements below DISAGREEMENT_FLOOR eps * scale are no regressions.
 #: A single rounding error can be 2 eps * scale.
 DISAGREEMENT_FLOOR = 2.0
-#: Smaller new ratios (disagreement / bound) are no regressions.
+#: New ratios (disagreement / bound) below _BOUND_RATIO_FLOOR are no regressions.
 _BOUND_RATIO_FLOOR = 0.1
 
 
@@ -328,7 +328,7 @@ def find_renamed_files(
 ) -> dict[str, str]:
     """Return the new source of each renamed file, by the old source.
 
-    A renamed file: the robot name has one removed and one added source.
+    A robot name with one removed and one added source marks a renamed file.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

@@ -43,8 +43,7 @@ MARKED_RUNS, CHARTED_RUNS = 20, 60
 #: The option `--all` removes the limit on a terminal.
 #: The HTML page's list of changes has at most MAX_SHOWN entries.
 MAX_SHOWN = 20
-#: A robot's section lists at most this number of runs.
-#: The same limit holds for changes in the section.
+#: A robot's section lists at most _MAX_LISTED runs and _MAX_LISTED changes.
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot.
 #: The key "" is for a report without the robot.

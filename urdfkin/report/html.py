@@ -54,14 +54,14 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
 
-#: Up to this number of robots, all details are open.
+#: Up to _MAX_OPEN_ROBOTS robots, all details are open.
 _MAX_OPEN_ROBOTS = 1
 #: Maximum number of unverified robots with open details.
 _MAX_OPEN_FAILURES = 20
-#: Above this number of robots, verified robots have no histograms.
+#: Above _MAX_DRAWN robots, verified robots have no histograms.
 #: The histograms of one robot take a second of computing time.
 _MAX_DRAWN = 100
-#: Above this number of characters, each robot has a separate file.
+#: Above MAX_PAGE_CHARACTERS, each robot has a separate file.
 MAX_PAGE_CHARACTERS = 5_000_000
 
 

@@ -133,7 +133,7 @@ def _check_coordinate_indices(model: ReportedModel) -> Iterator[str]:
 
 _TOLERANCE = 1e-9
 #: Maximum number of results.
-#: A double represents all integers up to this number.
+#: A double represents all integers up to 2^53.
 _MAX_RESULTS = 2**53
 
 

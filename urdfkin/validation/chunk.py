@@ -45,7 +45,7 @@ DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
 #: Minimum number of chunks of a robot with 200 samples.
-#: Several workers can then share the robot.
+#: Several workers can share a robot with several chunks.
 _MIN_CHUNKS = 8
 #: A chunk has at most 40 * DRAW_SIZE = 1000 configurations.
 #: For seven joints, 1000 configurations take about 0.5 s.

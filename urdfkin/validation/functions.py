@@ -1,8 +1,8 @@
 """Compare a user's function with urdfkin and the oracle.
 
 The user's function computes a quantity from (q), (q, v) or (q, v, a). The configurations are random, zero and
-at the joint limits. The allowed difference is a derived bound on rounding errors. Let urdfkin and the oracle
-agree, and the function disagree. Then the error is in the function.
+at the joint limits. The allowed difference is a derived bound on rounding errors. The error is in the
+function if urdfkin and the oracle agree.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ SAMPLES = 3
 #: Quaternions have no such limit.
 _MAX_RANDOM = 2.0
 #: Inputs are multiples of 1 / _STEPS_PER_UNIT.
-#: Quaternions and values at a joint limit are not.
+#: Exceptions are quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals.
 #: A double represents these multiples without rounding.
 _STEPS_PER_UNIT = 1024.0

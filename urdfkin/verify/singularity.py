@@ -187,7 +187,7 @@ class _SingularityExplainer:
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
         # An axis may pass through the frame's origin for every q.
-        # Then the samples consist of rounding errors.
+        # In this case, the samples consist of rounding errors.
         # `_bound_matrix_error` includes the base's distance from the world origin.
         # The samples have no base, so `_RANK_TOLERANCE` limits the noise.
         noise = min(self._bound_matrix_error(), _RANK_TOLERANCE)

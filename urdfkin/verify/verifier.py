@@ -56,7 +56,7 @@ Verify = bool | Literal["sample"]
 SAMPLE_SIZE = 100
 
 #: Maximum number of values that are compared at once.
-#: These values (2 MB) fit into the processor's cache.
+#: 262,144 doubles (2 MB) fit into the processor's cache.
 _MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
 _MAX_CONFIGURATIONS = 4096

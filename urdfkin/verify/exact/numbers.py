@@ -1,8 +1,8 @@
 """Interval arithmetic, and a reader of the exact decimals of a URDF text.
 
 An interval consists of a midpoint with many digits, and a radius. The library Arb (python-flint) guarantees
-that each result contains the true value. This holds for sums, products, quotients, roots, sines and cosines.
-Vectors are triples of intervals.
+that each result contains the true value. The guarantee covers sums, products, quotients, roots, sines and
+cosines. Vectors are triples of intervals.
 
 `read_exact_joints` reads the decimals of a URDF text without rounding them. `urdfkin.urdf.lint` has already
 checked the text.
