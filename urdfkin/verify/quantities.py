@@ -57,8 +57,8 @@ class Quantity:
         ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
-        factors: Number of vectors in the longest product: 3 for w x (w x d). `make_bound` adds 1 to `factors`
-            for LOCAL and WORLD.
+        factors: Number of vectors in the longest product. For example, w x (w x d) has 3 vectors.
+            `make_bound` adds 1 to `factors` for LOCAL and WORLD.
         results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
             the bound. If present, this function replaces `ask_oracle` and `scale`.
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
