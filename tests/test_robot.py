@@ -194,6 +194,8 @@ REFUSED: list[tuple[Callable[[Robot], object], str]] = [
         (lambda x, frame=frame: x.jacobian(x.neutral(), frame), "a frame must be the name of a link or joint")
         for frame in (3, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"]))
     ),
+    (lambda x: x.placement(Z(8), {HAND}), "a list of frames must have an order, and a set has none"),  # type: ignore[arg-type]
+    (lambda x: x.export("numpy", HAND, {"jacobian"}), "quantities must have an order"),  # type: ignore[arg-type]
     (lambda x: x.placement(Z(8), HAND, base={}), "base must be a BaseMotion or None: found dict"),  # type: ignore[arg-type]
 ]
 

@@ -8,7 +8,7 @@ from itertools import groupby
 
 from urdfkin.compiled.plan import CompiledTree, StepField
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import as_names, as_str
+from urdfkin.errors.validators import as_names, as_str, reject_set
 from urdfkin.export import recursion
 from urdfkin.export.check import EXPORT_MARK, SEAL
 from urdfkin.export.expression import Node, Number
@@ -171,6 +171,7 @@ def exportable_quantities() -> list[Quantity]:
 
 
 def _parse_quantities(names: Collection[str]) -> list[Quantity]:
+    reject_set(names, "quantities")
     checked = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
     rows = [find_quantity(name.replace("_", " ")) for name in dict.fromkeys(checked)]
     possible = ", ".join(row.method for row in exportable_quantities())
