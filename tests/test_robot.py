@@ -163,6 +163,24 @@ def test_a_disagreement_with_a_nan_ratio_is_raised_too(monkeypatch: pytest.Monke
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 
 
+class _RequiresGradient:
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy()")
+
+
+def test_symbols_of_casadi_and_tensors_with_a_gradient_are_input_errors(panda: Robot) -> None:
+    casadi: Any = pytest.importorskip("casadi")
+    for value, message in (
+        (casadi.SX.sym("q", 8), "q must be real numbers: found SX"),
+        (casadi.DM.zeros(8), r"q needs 8 numbers .* found shape \(8, 1\)"),
+        (_RequiresGradient(), "q cannot be converted to a NumPy array: .* Use tensor.detach"),
+    ):
+        with pytest.raises(InputError, match=message):
+            panda.placement(value, "panda_hand")
+    found = panda.placement(casadi.DM.zeros(8).T, "panda_hand")
+    assert np.array_equal(found[0], panda.placement(np.zeros(8), "panda_hand"))
+
+
 @pytest.mark.parametrize(
     "value",
     ["abc", np.ones(8) * 1j, [[1.0], [1.0, 2.0]], None, np.zeros(8, dtype="M8[s]"), ["0"] * 8],
