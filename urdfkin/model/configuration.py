@@ -531,8 +531,8 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
             own = np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
         blocks.append(check_range(own))
     converted = np.concatenate(blocks, axis=-1)
-    if mimic and any(joint.mimic for joint in tree.joints):
-        check_turns(tree, q, from_pinocchio(tree, converted, mimic=True), tree.name)
+    if mimic and (omitted := [i for i, joint in enumerate(tree.joints) if joint.mimic]):
+        check_turns(tree, omitted, q, from_pinocchio(tree, converted, mimic=True), tree.name)
     return converted
 
 
@@ -625,17 +625,22 @@ def _without_turns(angle: FloatArray) -> FloatArray:
     return np.arctan2(np.sin(angle), np.cos(angle))
 
 
-def check_turns(tree: KinematicTree, q: FloatArray, recovered: FloatArray, where: str) -> None:
-    """Raise InputError if cosines and sines lose turns that the pose depends on.
+def check_turns(
+    tree: KinematicTree, joints: Sequence[int], q: FloatArray, recovered: FloatArray, where: str
+) -> None:
+    """Raise InputError if cosines and sines lose turns that move a joint of `joints`.
 
     `recovered` is q after the conversion to cosines and sines and back.
     """
-    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+    for i in joints:
+        joint, at = tree.joints[i], tree.q_index[i]
         if not joint.kind.has_axis or not q.size:
             continue
-        lost = (joint.mimic.multiplier if joint.mimic else 1.0) * (q[..., at] - recovered[..., at])
+        multiplier = joint.mimic.multiplier if joint.mimic else 1.0
+        lost = multiplier * (q[..., at] - recovered[..., at])
         lost = np.abs(_without_turns(lost) if joint.kind.turns else lost)
-        if (lost > _MIMIC_TOLERANCE * np.maximum(1.0, np.abs(q[..., at]))).any():
+        allowed = _MIMIC_TOLERANCE * max(1.0, abs(multiplier)) * np.maximum(1.0, np.abs(q[..., at]))
+        if (lost > allowed).any():
             raise InputError(
                 f"the cosine and sine of an angle lose whole turns, which move joint {joint.name}",
                 where=where,

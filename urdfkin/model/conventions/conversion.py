@@ -436,9 +436,11 @@ class Conversion:
         inputs = self._parse_inputs(q, v, a)
         with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
             results = [self._to_target_q(inputs[0])]
-            if self.has_pairs and any(joint.mimic for joint in self.tree.joints):
+            if self.has_pairs and (omitted := set(range(len(self.tree.joints))) - set(self._order)):
                 recovered = self._recover_q(results[0])
-                configuration.check_turns(self.tree, inputs[0], recovered, self.convention.name)
+                configuration.check_turns(
+                    self.tree, sorted(omitted), inputs[0], recovered, self.convention.name
+                )
             if len(inputs) > 1:
                 results.append(self._to_target_rates(inputs[0], inputs[1]))
             if len(inputs) > 2:
