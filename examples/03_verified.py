@@ -1,7 +1,7 @@
 """Compare urdfkin's results with Pinocchio's results, and print the certificate.
 
-You learn how to choose the check of a single call with `verify`: all results, a sample, or none. You also
-learn that `certificate()` counts checked and unchecked results.
+You learn how `verify` selects the checked results of a call: all, a sample, or none. You also learn that
+`certificate()` counts checked and unchecked results.
 """
 
 import urdfkin

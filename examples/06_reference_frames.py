@@ -1,4 +1,4 @@
-"""Compute one velocity in three reference frames, and convert it from one reference frame to another.
+"""Compute one velocity in three reference frames, and convert between these frames.
 
 You learn that LOCAL, WORLD and LOCAL_WORLD_ALIGNED have the same meaning as in Pinocchio.
 """
@@ -13,14 +13,15 @@ np.set_printoptions(precision=4, suppress=True)
 for reference in urdfkin.Reference:
     print(f"{reference.name:<20} {robot.velocity(q, v, 'tool0', reference)}")
 
-# The velocity in LOCAL is expressed in the tool's axes.
-# The tool's rotation matrix converts the velocity from LOCAL to LOCAL_WORLD_ALIGNED.
+# LOCAL expresses the velocity in the tool's axes.
+# LOCAL_WORLD_ALIGNED expresses the velocity in the world's axes.
 R_world_tool = robot.placement(q, "tool0")[:3, :3]
 local = robot.velocity(q, v, "tool0", "local")
 aligned = robot.velocity(q, v, "tool0")  # the default frame
 assert np.allclose(R_world_tool @ local[:3], aligned[:3])
 
-# The velocity in WORLD is the velocity of the body's point that coincides with the world's origin.
+# WORLD is the velocity of a body point.
+# This body point coincides with the world's origin.
 p_world_tool = robot.placement(q, "tool0")[:3, 3]
 there = aligned[:3] - np.cross(aligned[3:], p_world_tool)
 assert np.allclose(there, robot.velocity(q, v, "tool0", "world")[:3])

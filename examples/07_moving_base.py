@@ -1,6 +1,7 @@
 """Compute the motion of a robot on a moving base.
 
-You learn two ways: pass a known motion of the base as `BaseMotion`, or add a floating root joint.
+You learn two ways to describe a moving base. Pass a known motion as `BaseMotion`, or add a floating root
+joint.
 """
 
 import numpy as np
@@ -10,16 +11,19 @@ import urdfkin
 arm = urdfkin.load("ur5")
 q, v, a = np.full(6, 0.3), np.zeros(6), np.zeros(6)
 
-# The arm is at rest on a turntable at 1 rad/s, so there is only the centripetal acceleration.
+# The arm is at rest on a turntable at 1 rad/s.
+# The acceleration is therefore only centripetal.
 turntable = urdfkin.BaseMotion(velocity=np.array([0, 0, 0, 0, 0, 1.0]))  # [linear; angular], world axes
 acceleration = arm.acceleration(q, v, a, "tool0", base=turntable)
 x, y, _ = arm.placement(q, "tool0", base=turntable)[:3, 3]
 print("on a turntable:", acceleration[:3].round(6), "m/s^2")
 assert np.allclose(acceleration[:3], [-x, -y, 0.0])  # w x (w x d), 7.130
 
-# The pose of a floating base is part of q, and its velocity is part of v.
+# q contains the pose of a floating base.
+# v contains the velocity of a floating base.
 free = urdfkin.load("ur5", root_joint="floating")
-# A configuration begins with the position x, y, z and the quaternion x, y, z, w of the base.
+# q begins with the base's position x, y, z.
+# The base's quaternion x, y, z, w follows.
 q_free = np.concatenate([[0, 0, 0, 0, 0, 0, 1.0], q])
 v_free = np.concatenate([[0, 0, 0, 0, 0, 1.0], v])
 print("as a floating base:", free.velocity(q_free, v_free, "tool0").round(6))

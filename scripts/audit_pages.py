@@ -1,13 +1,13 @@
-"""Check reports, comparisons, the documentation site and the viewer in Chromium, as a reader uses them.
+"""Check reports, comparisons, the site and the viewer in Chromium.
 
-Each page is opened at four widths, in a light and a dark theme. The script runs the accessibility checker
-axe, and looks for serious violations, errors in the console, sideways scrolling and requests to other hosts.
-The script also moves through the page with the Tab key, checks the HTML, and prints the page to a PDF.
-`--output` saves pictures of all screens and of the printed pages.
+Each page is opened at four widths, in two themes (light and dark). The script runs the accessibility checker
+axe, and reports serious violations. The script also reports console errors, sideways scrolling and requests
+to other hosts. The script also moves through the page with the Tab key. Further steps check the HTML, and
+print the page to a PDF. `--output` saves pictures of all screens and of the printed pages.
 
 The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. Three tools are
-optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils, which converts the pages
-of the PDF to pictures.
+optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils. Debian's poppler-utils
+converts the PDF's pages to pictures.
 
     npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
     python -m scripts.audit_pages --output /tmp/audit
@@ -51,16 +51,17 @@ ROOT = Path(__file__).parents[1]
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
 #: Time limit of axe-core, in seconds.
-#: axe-core needs half a minute for a page of 100,000 elements.
+#: For 100,000 elements of a page, axe-core needs 30 seconds.
 _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
 #: Maximum number of Tab presses per page.
-#: Maximum number of PDF pages that are converted to pictures.
-_PRESSES, _PAGES = 60, 12
+_PRESSES = 60
+#: Maximum number of PDF pages that become pictures.
+_PAGES = 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: The site's theme hides some elements if Chromium reports no mouse.
+#: Without a mouse, the site's theme hides some elements.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -73,12 +74,14 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: JavaScript that returns name, width and available width of each table that is wider than its box.
+#: JavaScript that lists tables that are wider than their box.
+#: Each item contains a table's name, width and available width.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: JavaScript that describes the element with the focus, and whether an outline or shadow marks it.
+#: JavaScript that describes the element with the focus.
+#: `shown` states whether an outline or shadow marks the element.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -88,7 +91,8 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript that returns whether the border of the focused element changes when it loses the focus.
+#: JavaScript that removes the focus from the focused element.
+#: The result states whether the element's border changes.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -105,7 +109,7 @@ class Page:
     ready: str = ""
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
-    whole: bool = True  # whether keyboard, HTML and PDF are checked, not only screens
+    whole: bool = True  # also check keyboard, HTML and PDF
 
 
 def read_axe_script() -> str | None:
@@ -208,7 +212,7 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
         Viewer(server, robot, q, make_line_trajectory(robot, q, -q, 2.0, 20) if plays else None)
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
-        ready = (  # The controls are hidden on a phone.
+        ready = (  # A phone hides the controls.
             "return !!document.querySelector('canvas')"
             " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
         )
@@ -219,7 +223,7 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def open_page(browser: Browser, page: Page) -> None:
-    # Chromium does not reload a page if the new address differs only in the part after `#`.
+    # A new `#part` of an address does not reload the page.
     browser.chrome.get("about:blank")
     browser.chrome.get(page.url)
     if page.ready:
@@ -255,7 +259,7 @@ def check_screen(
     ]
     if output is not None:
         for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-            # The browser draws a 3D view only while it is visible.
+            # The browser draws only visible 3D views.
             browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
             browser.settle()
         browser.js("scrollTo(0, 0)")
@@ -345,7 +349,8 @@ def main() -> None:
         return name.startswith(tuple(arguments.only))
 
     def audit_page(browser: Browser, page: Page) -> None:
-        # The site stores the theme of the first visit, so the stored theme is removed before each page.
+        # The site stores the theme of the first visit.
+        # Every new page must start without a stored theme.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
         page_faults = audit(browser, page, arguments.output, axe, jar)

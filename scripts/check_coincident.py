@@ -5,9 +5,9 @@
 
 Half of an arm's axes are at most 1 mm and 1e-3 rad from the previous axis (`nearly_coincident` in
 `tests/dh/test_compare.py`). For each arm, the script makes a standard and a modified table. For the first 400
-arms, the script also makes a strict table. All tables have other signs and zeros than the arm, and no base
-and tool. Each table must agree with its arm. For the first 400 arms, the script also counts the verdicts of
-`urdfkin same` for the arm and its standard table.
+arms, the script also makes a strict table. Signs and zeros of all tables differ from the arm's. The tables
+have no base and tool. Each table must agree with its arm. For the first 400 arms, `urdfkin same` compares arm
+and standard table. The script counts the verdicts.
 
 Exit 1: a table differs from its arm.
 """

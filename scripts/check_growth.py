@@ -4,11 +4,10 @@
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. After
-a check that takes longer than `--patience`, the script skips the larger documents with the same kind of
-content.
+a check that is longer than `--patience`, larger documents of this kind are skipped.
 
-Each document repeats one kind of content, as a file from a faulty exporter or an attacker may do. Even if
-urdfkin rejects the file, the time and memory of the check must be proportional to the file's size.
+Each document repeats one kind of content. Faulty exporters and attackers may write such files. Time and
+memory must be proportional to the file's size, even if urdfkin rejects the file.
 """
 
 import argparse
@@ -77,7 +76,7 @@ KINDS: dict[str, Kind] = {
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
     "bad numbers": _robot_with_many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
-    # Documents with many or long comments that suppress findings (`urdfkin: ignore`).
+    # Inputs with many or long comments `urdfkin: ignore`.
     "comments that suppress no finding": _robot_with_many("<!-- urdfkin: ignore[x{i}] y -->\n"),
     "consecutive comments": _robot_with_many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
@@ -161,7 +160,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return the processor time (s) and the memory with the findings (MB), both per MB of the document."""
+    """Return processor time (s) and memory with the findings (MB), per MB of document."""
 
     def read_usage() -> tuple[float, float]:
         return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
@@ -180,17 +179,17 @@ if __name__ == "__main__":
     option(
         "words",
         nargs="*",
-        help="measure only kinds of content whose names contain one of these texts (default: all)",
+        help="part of a kind's name, such as `number` (default: all kinds of content)",
     )
-    option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
-    option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
-    option("--one", type=int, help="check one document with this size in bytes, without further processes")
+    option("--sizes", default="1,4,16,64", help="document sizes in MB, separated by commas")
+    option("--patience", type=float, default=600.0, help="maximum time for one document, in seconds")
+    option("--one", type=int, help="check only one document, of this size in bytes")
     options = parser.parse_args()
     if options.one is not None:
         print(measure_cost(options.words[0], options.one))
         sys.exit()
     sizes = [float(size) for size in options.sizes.split(",")]
-    heads = ["time and memory per MB, by content and file size", *(f"{size:g} MB" for size in sizes)]
+    heads = ["kind of content (time and memory per MB)", *(f"{size:g} MB" for size in sizes)]
     print(table(heads, [], left=1))
     for kind in (kind for kind in KINDS if not options.words or any(word in kind for word in options.words)):
         cells: list[str] = []

@@ -1,6 +1,8 @@
-# Functions for try.sh, test.sh and test_long.sh. make_environment makes a virtual environment in .venv with urdfkin
-# and the extras in $1. It needs Python >= 3.11. If Python cannot make virtual environments, make_environment
-# installs Debian's python3-venv. install_nvcc installs CUDA's compiler.
+# Functions for try.sh, test.sh and test_long.sh.
+# make_environment makes a virtual environment in .venv with urdfkin and the extras in $1.
+# make_environment needs Python >= 3.11.
+# If Python cannot make virtual environments, make_environment installs Debian's python3-venv.
+# install_nvcc installs CUDA's compiler.
 
 cd "$(dirname "$0")/.." || exit 2
 
@@ -37,8 +39,9 @@ make_environment() {
     export PATH
 }
 
-# Install CUDA's compiler from the package registry into .venv/nvcc (280 MB). Return 1 if it does not install within
-# two minutes, or does not compile a kernel with this system's compiler.
+# Install CUDA's compiler from the package registry into .venv/nvcc (280 MB).
+# Return 1 if the installation takes more than two minutes.
+# Return 1 if the compiler cannot compile a kernel on this system.
 install_nvcc() {
     [ ! -x .venv/nvcc/bin/nvcc ] || return 0
     [ -x .venv/bin/pip ] || { echo "there is no .venv; first run make setup" >&2 && return 1; }

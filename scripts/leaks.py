@@ -1,4 +1,4 @@
-"""Check for leaks of memory and files: load N different robots, and print the memory in use after each part.
+"""Check for leaks: load N robots, and print the memory after each part.
 
 python -m scripts.leaks 10000
 """
@@ -48,7 +48,8 @@ def measure_usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    # `use_only` loads each kernel at its first use. A later load of a kernel would look like a leak.
+    # Later loads of kernels would look like a leak.
+    # `use_only` loads each kernel at its first use.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

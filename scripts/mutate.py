@@ -44,9 +44,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Files that Numba compiles. The script skips these files.
-#: The script changes syntax trees, but Numba reads the source text.
-#: tests/laws/test_mutation.py tests mutants of these files without Numba.
+#: Files that Numba compiles; the script skips these files.
+#: Numba reads the source text, not the mutant's syntax tree.
+#: tests/laws/test_mutation.py tests such mutants without Numba.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
     "compiled/machine/sine.py", "compiled/machine/single.py", "compiled/outputs.py", "compiled/recursion.py",
@@ -78,9 +78,9 @@ def _read_tests() -> dict[Path, str]:
 
 
 def find_near_tests(path: Path) -> list[str]:
-    """Return the test files that mention a module, and the test files of its package.
+    """Return the test files that mention a module or belong to the module's package.
 
-    For a package without test files, return test_robot.py and the files in tests/verify and tests/laws.
+    For a package without test files, return test_robot.py, tests/verify and tests/laws.
     """
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(
@@ -105,8 +105,8 @@ def find_near_tests(path: Path) -> list[str]:
 @dataclass(frozen=True)
 class NamedMutant:
     claim: str  # the mistake that must be detected
-    #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`.
-    #: For code outside functions, this is the full name of the module.
+    #: Full name, for example `urdfkin.dh.snapping.snap_report`.
+    #: For code outside functions, the module's full name.
     function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`

@@ -1,9 +1,10 @@
 #!/bin/sh
-# Run the fast tests with the oldest and the newest versions that pyproject.toml allows. The first Python runs with
-# the lowest version of each library that pyproject.toml names. Every Python runs with the newest versions. Each
-# environment takes 1.5 GB below .versions.
+# Run the fast tests with the oldest and the newest allowed versions of libraries.
+# The first Python uses the lowest versions in pyproject.toml.
+# Every Python uses the newest versions.
+# Each environment takes 1.5 GB below .versions.
 #
-#   scripts/test_versions.sh [PYTHON...]     default: python3.11 and what is found of 3.12, 3.13, 3.14
+#   scripts/test_versions.sh [PYTHON...]     default: all installed python3.11 to python3.14
 cd "$(dirname "$0")/.." || exit 2
 
 if [ $# -eq 0 ]; then

@@ -16,7 +16,7 @@ from typing import Any
 
 
 def flat(x: Any) -> list[float]:
-    """Return all numbers in an array or in nested lists as one list, row by row."""
+    """Return all numbers of an array or nested lists as one list, row by row."""
     return [number for row in x for number in flat(row)] if hasattr(x, "__len__") else [float(x)]
 
 

@@ -1,5 +1,6 @@
-// The loop around the straight-line code of one robot: from memory to registers and back, for as many
-// configurations at a time as a register has lanes. ROBOT is a file with that code and the robot's sizes.
+// The loop around the straight-line code of one robot.
+// One step computes LANES configurations, one in each lane of a register.
+// ROBOT is a file with this code and the robot's sizes.
 
 #include <string.h>
 
@@ -20,8 +21,8 @@ INLINE lanes in_all_lanes(double x) { return x - (lanes){}; }
 
 #include ROBOT
 
-// Loops that the compiler unrolls, so that x lies in registers: single numbers, pairs and fours change places
-// across the diagonal.
+// The compiler unrolls the loops of `transpose` and keeps x in registers.
+// Numbers, pairs and groups of four are exchanged across the diagonal.
 #if LANES == 8
 #define EXCHANGE_1 {0, 8, 2, 10, 4, 12, 6, 14}, {1, 9, 3, 11, 5, 13, 7, 15}
 #define EXCHANGE_2 {0, 1, 8, 9, 4, 5, 12, 13}, {2, 3, 10, 11, 6, 7, 14, 15}
@@ -45,7 +46,8 @@ INLINE void transpose(lanes x[LANES]) {
 #endif
 }
 
-// The numbers that stand at the places `at` in each of so many rows. What lies beyond a row's end is read as well.
+// Read the numbers with the indices `at` from LANES rows.
+// The function also reads numbers beyond the end of a row.
 INLINE void read(const double *from, int width, const int *at, lanes *to) {
     for (int first = 0; first < width; first += LANES) {
         int wanted = 0;
@@ -59,7 +61,7 @@ INLINE void read(const double *from, int width, const int *at, lanes *to) {
     }
 }
 
-// Write row by row. If a row is shorter than a register, the excess is overwritten by the next row.
+// Write row by row. After a row that is shorter than a register, the next row overwrites the excess.
 INLINE void write(const lanes *results, double *to) {
     for (int j = 0; j < RESULTS; j += LANES) {
         int first = j + LANES <= RESULTS || RESULTS < LANES ? j : RESULTS - LANES;
@@ -76,8 +78,8 @@ INLINE lanes polynomial(lanes z, const double *coefficients, int count) {
     return value;
 }
 
-// Cody and Waite's reduction and fdlibm's polynomials, as in urdfkin/compiled/machine/sine.py, without what that does
-// to be right to the last digit.
+// Cody and Waite's reduction and fdlibm's polynomials, as in urdfkin/compiled/machine/sine.py.
+// Unlike sine.py, the function does not correct the last digit.
 INLINE void sine_cosine(lanes x, lanes *sine, lanes *cosine) {
     const double no_fraction = 0x1.8p52, pi_2 = 0x1.921fb54442d18p0;
     lanes shifted = x * (1 / pi_2) + no_fraction, n = shifted - no_fraction;
@@ -103,7 +105,8 @@ INLINE void block(const double *q, const double *v, const double *a, double *out
     write(results, out);
 }
 
-// The last ones: rows of a copy, so that nothing beyond the end is read or written.
+// Compute the last configurations (fewer than LANES) in a copy.
+// The loop thus reads and writes nothing beyond the end of the arrays.
 static void few(long n, const double *q, const double *v, const double *a, double *out) {
     double own_q[LANES * NQ + 8] = {}, own_v[LANES * NV + 8] = {}, own_a[LANES * NV + 8] = {}, own[LANES * RESULTS + 8];
     memcpy(own_q, q, n * NQ * sizeof *q);

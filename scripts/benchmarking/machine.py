@@ -1,6 +1,6 @@
-"""Describe the machine; measure the memory of a batch and the time of a first use in new processes.
+"""Describe the machine; measure a batch's memory and the time of a first use.
 
-This module runs itself in a new process, which has loaded no kernel and no library yet.
+This module runs itself in new processes. A new process has loaded no kernel and no library.
 """
 
 import json
@@ -21,9 +21,12 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the time (ms) for a first result, with an empty kernel cache and with stored kernels.
+#: Keys of the times (ms) for a first result.
+#: The kernel cache is empty, or contains the kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` that compile a kernel at their first call, with the number of inputs q, v and a.
+#: Maps a method of `Robot` to its number of inputs.
+#: The first call of the method compiles a kernel.
+#: Inputs: 1: q. 2: q, v. 3: q, v, a.
 USES = {
     "placement": 1,
     "velocity": 2,

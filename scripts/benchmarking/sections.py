@@ -154,12 +154,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# For a batch, the benchmark measures kernels that have only the first k steps, for each k.
-# The time of step k is the time for k steps, minus the time for k - 1 steps.
-# For one configuration, the benchmark measures seven lines of Python (`_calls`).
-# The time of a step follows from differences between the times of the lines.
+# For a batch, kernel k executes the first k steps.
+# time(step k) = time(kernel k) - time(kernel k - 1)
+# For one configuration, `_calls` has seven lines of Python.
+# A step's time is a difference of line times.
 
-#: The steps of a batch, each with the instructions of the compiled program that the step executes.
+#: Maps a step of a batch to its instructions.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -170,7 +170,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each step (ns per configuration), for each robot and quantity."""
+    """Yield each step's time (ns per configuration), for each robot and quantity."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [
@@ -206,7 +206,8 @@ def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram,
         program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, buffered=buffered
     )
     core = getattr(kernels, f"{quantity}s")
-    # The kernel arguments contain addresses of arrays, so the arrays must exist until the last call.
+    # `kernel_args` contains addresses of the arrays in `owners`.
+    # The default argument keeps these arrays alive.
     owners = program, memory, out, inputs
 
     def compute(_: object = owners) -> None:
@@ -257,7 +258,7 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # This line calls no function, so the measured time is the time of the loop.
+        "q",  # time of the loop alone
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # `compute` rejects a tuple as `out`.
         "empty(shape)",

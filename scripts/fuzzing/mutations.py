@@ -1,7 +1,7 @@
-"""Make mutants of real URDFs; the same seed and number give the same bytes on any machine.
+"""Make mutants of real URDFs; seed and number determine the bytes.
 
-There are four families: bytes, tokens, attributes, and structure (new parents, closed loops, swapped names,
-changed types and mimic rules).
+There are four families: bytes, tokens, attributes and structure. Structure means new parents, closed loops,
+swapped names, changed types and mimic rules.
 """
 
 import contextlib
@@ -14,7 +14,8 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size (bytes) of a mutated file, because mutants of larger files are slow to test.
+#: Maximum size (bytes) of a file for mutations.
+#: Mutants of larger files are slow to test.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -43,7 +44,8 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: Half of all changes are of `_STRUCTURE`, because urdfkin rejects most mutants of the other families.
+#: urdfkin rejects most mutants of the first three families.
+#: Half of all changes therefore belong to `_STRUCTURE`.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
@@ -86,12 +88,12 @@ def _change_tokens(rng: random.Random, kind: str, data: bytes) -> bytes:
         odd = (b"\n", b"<!DOCTYPE robot>", b'<!DOCTYPE r [<!ENTITY a "b">]>', b"<!-- -->", b"text")
         return rng.choice(odd) + data
     pattern = {"odd_number": _NUMBER, "odd_blank": re.compile(rb" ")}.get(kind, _VALUE)
-    # The first match after a random position is found faster than all matches.
+    # A search for one match is faster than for all.
     starts = [rng.randrange(len(data) + 1) for _ in range(2)]
     first, second = (pattern.search(data, position) or pattern.search(data) for position in starts)
     if first is None or second is None:
         return data
-    group = pattern.groups  # Group 2 is an attribute's value, and group 0 is the whole match.
+    group = pattern.groups  # 2: an attribute's value; 0: the whole match
     if kind == "swap_values":
         if first.start() == second.start():
             return data
@@ -113,7 +115,7 @@ def _change_tree(rng: random.Random, kind: str, data: bytes) -> bytes:
         return data
     if root.tag != "robot":
         return data
-    # If the file has no element to which the change `kind` applies, the tree stays unchanged.
+    # Without a suitable element, the tree stays unchanged.
     with contextlib.suppress(IndexError):
         (_change_structure if kind in _STRUCTURE else _change_elements)(rng, kind, root)
     changed: bytes = ET.tostring(root, encoding="utf-8")

@@ -1,4 +1,4 @@
-// What the report's 3D view uses of three.js; everything else is left out of the bundle.
+// The parts of three.js that the report's 3D view uses. The bundle omits all other parts.
 export {
   AmbientLight, Box3, BoxGeometry, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight,
   Float32BufferAttribute, GridHelper, Group, HemisphereLight, LineBasicMaterial, LineDashedMaterial,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.cli.running import urdfkin as command
-from tests.urdfs import chain, joint, limit, mimic
+from tests.urdfs import chain, joint, limit, loaded, mimic
 from tests.urdfs import robot as robot_of
 from urdfkin.compiled import breakdown
 from urdfkin.compiled.breakdown import AccelerationBreakdown
@@ -196,6 +196,24 @@ FAINT = robot_of(
     joint("x", "continuous", "a", "b"),
     joint("y", "continuous", "a", "c", axis="0 1 0", more=mimic("x", "5e-324")),
 )
+
+
+@pytest.mark.parametrize("small", [1e-309, -1e-312, 3e-320])
+@pytest.mark.parametrize("large", [1.0, -2.5e11, 1e150])
+def test_a_hessian_with_a_subnormal_and_a_large_multiplier_is_verified(small: float, large: float) -> None:
+    """A subnormal multiplier has a large relative rounding error, and the large one multiplies this error."""
+    turned = 'xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"'
+    robot = loaded(
+        robot_of(
+            joint("x", "continuous", "a", "b"),
+            joint("y", "continuous", "a", "c", turned, "0.6 0 0.8", mimic("x", large)),
+            joint("z", "continuous", "c", "d", turned, "0 0.6 0.8", mimic("x", small)),
+            joint("w", "continuous", "d", "e", turned, "0.6 0 0.8"),
+        )
+    )
+    for reference in ("local", "world", "local_world_aligned"):
+        assert np.isfinite(robot.hessian([1e-12, 0.4], "e", reference)).all()
+    assert robot.certificate().verified
 
 
 # -- results beyond the largest number -------------------------------------------------------------

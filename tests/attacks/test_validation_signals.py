@@ -12,9 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.running import python, urdfkin
+from tests.cli.running import Done, python, urdfkin
 from urdfkin.cli.exit import Stop, handle_signals
-from urdfkin.validation import answer
+from urdfkin.errors import InputError
+from urdfkin.robot import Robot
+from urdfkin.validation import accuracy, answer
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 
 pytestmark = pytest.mark.long
@@ -167,12 +169,37 @@ def test_only_the_first_signal_interrupts_and_the_handlers_are_restored() -> Non
             signal.signal(each, handler)
 
 
+class Dying:
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGTERM)  # Python ignores the KeyboardInterrupt of the handler.
+
+
+def run_and_restore_the_handlers(command: str) -> Done:
+    before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP)]
+    try:
+        return urdfkin(command)
+    finally:
+        for each, handler in zip((signal.SIGTERM, signal.SIGHUP), before, strict=True):
+            signal.signal(each, handler)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_signal_in_a_destructor_during_the_accuracy_study_stops_the_run_after_the_robot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def study(robot: Robot, **_: object) -> None:
+        studies.append(robot.name)
+        Dying()
+        raise InputError("not to be studied")
+
+    studies: list[str] = []
+    monkeypatch.setattr(accuracy, "accuracy_study", study)
+    done = run_and_restore_the_handlers("validate planar_two_link ur5 --samples 0 --accuracy")
+    assert (done.code, studies) == (143, ["planar_two_link"])
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_signal_in_a_destructor_stops_the_run_after_the_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Dying:
-        def __del__(self) -> None:
-            signal.raise_signal(signal.SIGTERM)  # Python ignores the KeyboardInterrupt of the handler.
-
     def run(chunk: Chunk) -> ChunkResult:
         chunks.append(chunk)
         Dying()
@@ -180,11 +207,6 @@ def test_a_signal_in_a_destructor_stops_the_run_after_the_chunk(monkeypatch: pyt
 
     chunks: list[Chunk] = []
     monkeypatch.setattr(answer, "run_chunk", run)
-    before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP)]
-    try:
-        done = urdfkin("validate planar_two_link --samples 200")
-    finally:
-        for each, handler in zip((signal.SIGTERM, signal.SIGHUP), before, strict=True):
-            signal.signal(each, handler)
+    done = run_and_restore_the_handlers("validate planar_two_link --samples 200")
     assert (done.code, len(chunks)) == (143, 1)
     assert "interrupted: 28 of 203 samples" in done.text

@@ -127,7 +127,7 @@ def test_transposed_poses_are_refused_in_every_form(tmp_path: Path) -> None:
 
 def test_wrong_arrays_of_poses_are_reported(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
-    with pytest.raises(InputError, match="`q` and `T`, `q` and `p`, or `q`, `p` and `quat`: found q, T, p"):
+    with pytest.raises(InputError, match=r"\(q, T\), \(q, p\) or \(q, p, quat\): found q, T, p"):
         read_poses(tmp_path / "x.npz", NAMES, NAMES)
 
 

@@ -568,6 +568,33 @@ def test_a_unit_in_the_heading_of_a_limit_is_read() -> None:
     assert (present(limit).lower, present(limit).upper) == (-math.pi / 2, math.pi / 4)
 
 
+def _markdown_with_column(heading: str) -> str:
+    rule, row = "|---" * 5 + "|", "| 0 | 0 | 0 | 0 | 180 |"
+    return f"convention: standard\n\n| a | alpha | d | theta | {heading} |\n{rule}\n{row}\n"
+
+
+@pytest.mark.parametrize(
+    ("heading", "velocity", "effort"),
+    [
+        ("velocity [deg/s]", math.pi, math.inf),
+        ("Velocity (rad / s)", 180.0, math.inf),
+        ("effort [N·m]", math.inf, 180.0),
+    ],
+)
+def test_a_unit_of_a_velocity_or_an_effort_in_a_heading_is_read(
+    heading: str, velocity: float, effort: float
+) -> None:
+    text = _markdown_with_column(heading)
+    limit = present(table_from_text(text, ".md").rows[0].limit)
+    assert (limit.velocity, limit.effort) == (velocity, effort)
+
+
+@pytest.mark.parametrize("heading", ["velocity [rpm]", "effort [deg]", "lower [deg/s]"])
+def test_an_unknown_unit_in_the_heading_of_a_limit_is_an_error(heading: str, tmp_path: Path) -> None:
+    text = _markdown_with_column(heading)
+    assert f"header: unknown unit in a heading: found {heading}; write [" in refused(tmp_path, text, ".md")
+
+
 def test_a_multiple_of_pi_is_in_radians_also_in_limits_and_mimic_joints_of_a_table_in_degrees() -> None:
     rows = [
         {"joint": "a", "limit": {"lower": "-pi/2", "upper": 180}},

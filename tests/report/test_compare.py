@@ -2,6 +2,7 @@
 
 import copy
 import math
+from copy import deepcopy
 from functools import reduce
 from operator import getitem
 from typing import Any, cast
@@ -145,6 +146,20 @@ def test_a_wider_bound_and_tables_no_longer_compared_are_regressions() -> None:
     del new["robots"][0]["chains"][0]
     assert (True, what) in words(arms(), new)
     assert compare(new, arms()).exit_code == 0
+
+
+def test_a_quantity_no_longer_compared_with_the_second_oracle_is_a_regression() -> None:
+    pair = {"failed": 0, "worst": 1.0, "bound_ratio": 0.1}
+    alone = {"urdfkin": 0, "pinocchio": 0, "second_oracle": 0}
+    second = {"by": "mujoco", "urdfkin": pair, "pinocchio": pair, "alone": alone, "undecided": 0}
+    old: Any = arms()
+    for check in old["robots"][0]["checks"][:2]:
+        check["second_oracle"] = second
+    assert words(old, arms()) == [(True, "panda: comparisons with mujoco: 2 -> nothing")]
+    assert words(arms(), old) == [(False, "panda: comparisons with mujoco: nothing -> 2")]
+    new = deepcopy(old)
+    del new["robots"][0]["checks"][0]["second_oracle"]
+    assert words(old, new) == [(True, "panda: comparisons with mujoco: 2 -> 1")]
 
 
 def test_a_ratio_to_the_bound_above_a_tenth_that_grows_by_more_than_the_factor_is_a_regression() -> None:

@@ -170,6 +170,18 @@ def test_the_command_of_a_report_repeats_the_run_with_a_line_for_each_set_of_opt
     assert worst == worst_again
 
 
+def test_the_command_of_a_robot_that_cannot_be_loaded_has_the_locks_and_the_xacro_arguments(
+    tmp_path: Path,
+) -> None:
+    report = validate("ur5", samples=0, lock={"nope": 1})
+    assert report.robots[0].verdict == "bad input"
+    assert report.command == "urdfkin validate ur5 --samples 0 --seed 0 --lock nope=1.0"
+    xacro = tmp_path / "missing.xacro"
+    report = validate(str(xacro), samples=0, xacro_args={"arm": "left one"})
+    assert report.robots[0].verdict == "bad input"
+    assert "--xacro-arg 'arm:=left one'" in report.command
+
+
 def test_validate_accepts_every_kind_of_source_that_load_accepts() -> None:
     path = str(catalogue()["planar_two_link"].path)
     screws = urdfkin.load("ur5").screws("tool0", "base")

@@ -1,8 +1,9 @@
-"""Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
+"""Fit a robot's parameters to measured poses, and report uncertainties and warnings.
 
-A fit that is not plausible (`plausible.py`) is refused. Without `write_all`, joint parameters that changed by
-at most two standard deviations get their original values. The other parameters of joints and all identifiable
-parameters of base and tool are fitted again. Parameters that the file can store are then written.
+Implausible fits (`plausible.py`) are refused. Without `write_all`, a joint parameter must change by more than
+two standard deviations. Otherwise, the parameter gets its original value. The other joint parameters are
+fitted again. This fit includes all identifiable parameters of base and tool. Parameters that the file can
+store are then written.
 
 `read_poses` reads measured poses:
 
@@ -63,25 +64,27 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general_identification`.
 _GENERAL_CONFIGURATIONS = 40
-#: A warning is given if `Fit.noise_ratio` differs from 1 by more than this number of standard deviations.
+#: Maximum |noise_ratio - 1| without a warning, in standard deviations.
 _NOISE_RATIO_SIGMAS = 4.0
-#: Ratio of uncertainties (`Calibration.poorly_observable`) above which a parameter is poorly observable.
+#: Maximum uncertainty ratio of a parameter with good observability.
+#: `Calibration.poorly_observable` defines the ratio.
 _MAX_UNCERTAINTY_RATIO = 10.0
 _RANDOM_SEED = 1
-#: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
+#: J = Q R is rank-deficient if min |R_ii| <= tolerance * max |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: If the tool is fitted without poses, the target is assumed at (L/5, L/6, L/7) in the tip's frame.
-#: L is `ParametricChain.characteristic_length` (m).
-#: A target at this position hardly ever lies on a joint axis.
+#: Without poses, the target's position is assumed.
+#: In the tip's frame: (L/5, L/6, L/7), m.
+#: L is `ParametricChain.characteristic_length`, m.
+#: A joint axis hardly ever passes through this position.
 _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
-#: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
+#: Factor of `rounding_bound` in the comparison with Pinocchio.
+#: Pinocchio rounds more often than the fit.
+#: Pinocchio reads the written file.
+#: Base and tip are computed separately.
 _ROUNDING_FACTOR = 4.0
-#: Maximum number of parameters or poses that a warning names.
+#: Maximum number of parameters or poses named in a warning.
 _MAX_NAMES = 6
-_UNKNOWN_REASON = (
-    "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
-)
+_UNKNOWN_REASON = "the reason is unknown; it is not degrees, shifted rows of q or reversed joint signs"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,15 +94,16 @@ class Calibration:
     Attributes:
         robot: The robot before the calibration.
         model: The model with the parameters to fit.
-        identification: The parameters that are identifiable from the measured poses. Without poses, the same
-            as `general_identification`.
+        identification: The parameters that are identifiable from the measured poses. Without poses, equal to
+            `general_identification`.
         general_identification: The parameters that are identifiable from random poses.
         full_fit: The fit; None without poses.
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to its uncertainty at the
-            measured configurations, divided by its uncertainty at equally many random configurations.
+        poorly_observable: {index of a poorly observable parameter: ratio of uncertainties}. Numerator:
+            uncertainty at the measured configurations. Denominator: uncertainty at equally many random
+            configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -257,23 +261,23 @@ def calibrate(
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "gains":
             the scale factors of the joint values. "origins": six numbers of each joint origin. For a table,
-            "origins" means the cells of the table. A row has the cell beta only if the next axis is nearly
-            parallel or beta is not 0.
-        noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
-            an axis (rad). By default, the noise is estimated from the residuals.
+            "origins" means the cells of the table. Cell beta is fitted only if the next axis is nearly
+            parallel, or beta is not 0.
+        noise: Standard deviations of a position coordinate (m) and of a rotation about an axis (rad). By
+            default, the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
         full_poses: Whether you will measure full poses, not only positions. The argument has no effect if
             `poses` is given.
         radians: True if joint angles of more than one turn are in radians.
-        force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
-            Joint values that look like degrees are refused even with `force`. Convert degrees to radians, or
-            pass `radians=True` if the values are in radians.
+        force: Whether to return an implausible fit; `plausibility` then contains the reasons. Joint values
+            that look like degrees are refused even with `force`. Convert degrees to radians, or pass
+            `radians=True` if the values are in radians.
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
-        InputError: an array has a wrong shape, a number is not finite, there are no poses, or the positions
-            are not in metres. Also raised if only one of `q` and `poses` is given, and if `tip` or `base` is
-            given for a table.
+        InputError: an array has a wrong shape, a number is not finite, or there are no poses. Also if
+            positions are not in metres. Also if only one of `q` and `poses` is given. Also if `tip` or `base`
+            is given for a table.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
@@ -363,7 +367,10 @@ def fit_model(
 
 
 def _values_with_assumed_target(model: CalibrationModel) -> FloatArray:
-    """Return the original parameters (p,), with the assumed target if the tool is fitted."""
+    """Return the original parameters (p,).
+
+    If the tool is fitted, the target is at its assumed position.
+    """
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.is_base_or_tool and parameter.element == "tool" and parameter.unit == "m":
@@ -467,9 +474,10 @@ def _add_identifiable(
     stated: Noise | None,
     full_fit: Fit,
 ) -> tuple[Identification, Fit]:
-    """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
+    """Add parameters that significantly reduce the residuals.
 
-    At the original values, fewer are identifiable, for example if the tip lies on the last joint's axis.
+    The fitted values can make more parameters identifiable. For example, the original tip can lie on the last
+    joint's axis.
     """
     again = identify(
         model,
@@ -523,14 +531,17 @@ def _find_poorly_observable(
 
 
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
-    """Check the written model with base, tool and gains 0, because a URDF cannot contain them."""
+    """Check the written model.
+
+    A URDF cannot contain base, tool and gains. These parameters are 0 in the check.
+    """
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:
         return None
     parameter_values = fitted.parameter_values.copy()
     parameter_values[[p.is_base_or_tool or p.name == "gain" for p in calibration.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # The first `load` has already given the warnings.
+        warnings.simplefilter("ignore")  # The first `load` gave these warnings.
         if (table := calibration.table) is not None:
             robot = load(table)
             robot.placement(robot.neutral(), robot.tip_frame)
@@ -611,8 +622,8 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest accepted error of a rotation matrix, of a pose's last row, or of the length of a quaternion.
-#: The tolerance is large, because numbers in files are rounded.
+#: Maximum error of rotation matrices, last rows and quaternion lengths.
+#: Numbers in files are rounded, so the tolerance is large.
 _ROTATION_TOLERANCE = 1e-3
 _POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
@@ -629,7 +640,7 @@ def read_poses(
     units: Mapping[str, str] | None = None,
     default_q: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), m.
+    """Read configurations (s, nq) with poses (s, 4, 4) or positions (s, 3), m.
 
     A CSV file must contain `required_coordinates`. `default_q` (nq,) contains the values of coordinates
     without a column.
@@ -697,8 +708,7 @@ def _read_npz_poses(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
     if ("T" in data) == ("p" in data) or ("quat" in data and "p" not in data):
         found = ", ".join(data)
         raise InputError(
-            "a file of measured poses must contain the arrays `q` and `T`, `q` and `p`, or `q`, `p` and"
-            " `quat`",
+            "a file of measured poses must contain the arrays (q, T), (q, p) or (q, p, quat)",
             where=str(path),
             found=found,
         )

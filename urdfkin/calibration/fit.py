@@ -1,10 +1,10 @@
-"""Identify and fit the parameters of a model from measured poses.
+"""Identify and fit model parameters from measured poses.
 
-**Identifiability.** A change of parameters without effect on the measurements cannot be identified. The null
-space of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
+**Identifiability.** A parameter change without effect on the measurements is not identifiable. The null space
+of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
 identifiable parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value. The
-bound takes rounding errors into account (Weyl's inequality). The rank is the number of singular values with
-a positive lower bound, so no tolerance is needed.
+bound takes rounding errors into account (Weyl's inequality). The rank is the number of positive lower bounds.
+The rank needs no tolerance.
 
 Some changes of a joint's frame can be compensated by an opposite change of the next frame (Everett, Driels
 and Mooring, 1987):
@@ -24,9 +24,9 @@ base to tip. Each parameter has a column in the Jacobian.
     candidate: a column with a remainder that is at least half as long as the longest remainder
     next chosen column: the first candidate in the model's order of preference
 
-Columns with shorter remainders are excluded, because fitted parameters with nearly dependent columns can
-become very large. For example, four fitted lengths along nearly parallel axes could be hundreds of metres,
-and cancel each other.
+Columns with shorter remainders are excluded. Fitted parameters with nearly dependent columns can become very
+large. Four lengths along nearly parallel axes are an example. The lengths could be hundreds of metres, with a
+small sum.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum:
@@ -37,8 +37,8 @@ Each error is divided by the standard deviation of its noise. At the minimum:
     H = J C J^T         hat matrix
     1 - H_ii            redundancy of measurement i
 
-If you do not state the noise, the noise is estimated from the residuals. The estimation is repeated until
-the estimates are constant (Foerstner's variance components).
+The residuals give an estimate of unstated noise. The estimation is repeated until the estimates are constant
+(Foerstner's variance components).
 
     variance of the positions = sum of their squared residuals / sum of their redundancies
     variance of the rotations = sum of their squared residuals / sum of their redundancies
@@ -51,9 +51,9 @@ A pose is an **outlier** if its statistic is too large:
     limit                     without outliers, some statistic exceeds it with a probability of about 1 %
 
 One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
-The steps end when no outlier is left, or at the maximum number of outliers.
+The steps end without outliers, or at the maximum number of outliers.
 
-**Start values.** Before the fit, start values of base and tool are computed from the measured poses.
+**Start values.** The measured poses give start values of base and tool.
 
     T_i, R_i, p_i       robot's poses, with rotations and positions
     M_i, R_Mi, p_Mi     measured poses
@@ -64,10 +64,10 @@ The steps end when no outlier is left, or at the maximum number of outliers.
     R_B^T R_Mi = R_i R_X              linear in R_B and R_X; their entries form the null vector (Shah, 2013)
     p_Mi = R_B (R_i x + p_i) + b      linear in x and b
 
-If only positions are measured, the base and the target's position on the tip are unknown. A known target
-position determines the base's rotation directly. A known rotation of the base makes the equations for the
-positions of base and target linear. The module therefore repeats two steps: the base's rotation, then the
-positions of base and target.
+Let only positions be measured, and let base and target be unknown. The module repeats two steps:
+
+1. Solve for R_B at the last value of x.
+2. Solve for x and b at this R_B. These equations are linear.
 """
 
 from __future__ import annotations
@@ -89,11 +89,11 @@ from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: Least length of a candidate's remainder, as a fraction of the longest remainder's length.
+#: Minimum length of a candidate's remainder / longest remainder.
 _PIVOT_FRACTION = 0.5
-#: Maximum number of parameter names in the text "same effect as ...".
+#: Maximum number of names in "same effect as ...".
 _MAX_NAMES = 3
-#: The text "same effect as ..." omits parameters that contribute at most this fraction of the effect.
+#: Minimum effect of a named parameter / total effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -104,7 +104,7 @@ class Identification:
     Attributes:
         free_parameters: Indices of the fitted parameters, which have linearly independent effects.
         fixed_parameters: Indices of the fixed parameters, each with the reason.
-        measured_numbers: Number of measured coordinates: 3 of each position, or 6 of each full pose.
+        measured_numbers: Number of measured coordinates: 3 per position, or 6 per full pose.
     """
 
     free_parameters: tuple[int, ...]
@@ -203,18 +203,18 @@ def join_names(names: Iterable[str], limit: int) -> str:
     return ", ".join(every[:limit]) + (f" and {len(every) - limit} more" if len(every) > limit else "")
 
 
-#: `Fit.has_redundancy` is true if the total redundancy is at least this number.
+#: Minimum total redundancy for `Fit.has_redundancy`.
 #: The total redundancy is an integer plus rounding errors.
 _MIN_TOTAL_REDUNDANCY = 0.5
-#: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
-#: A measurement error along an eigenvector with the eigenvalue zero does not change the residuals.
+#: Relative limit below which an eigenvalue of I - H_ii is 0.
+#: Errors along eigenvectors of eigenvalue 0 do not change residuals.
 _EIGENVALUE_CUTOFF = 1e-9
 _MAX_NOISE_ESTIMATES = 20
-#: The estimation ends when the relative change of the estimated noise is at most this number.
+#: Relative change at which the noise estimation ends.
 _NOISE_CONVERGENCE = 1e-3
-#: Probability that urdfkin reports at least one outlier in a data set without outliers.
+#: Probability of any reported outlier in data without outliers.
 FALSE_ALARM = 0.01
-#: Number of standard deviations above which the change of a parameter is significant.
+#: Significance limit of a parameter's change, in standard deviations.
 SIGMAS = 2.0
 _MAX_OUTLIER_FRACTION = 0.25
 
@@ -223,7 +223,8 @@ _MAX_OUTLIER_FRACTION = 0.25
 class Measurements:
     """Measured poses or positions.
 
-    The measurements are in the instrument's frame if the model has `base` parameters, else in the base frame.
+    If the model has `base` parameters, the measurements are in the instrument's frame. Otherwise, the
+    measurements are in the base frame.
 
     Attributes:
         joint_values: (s, n) joint values of the path, rad or m.
@@ -259,7 +260,7 @@ class Noise:
     radians: float
 
     def deviations(self, full_poses: bool) -> FloatArray:
-        """Return (6,) standard deviations of a measured pose, or (3,) of a measured position."""
+        """Return the standard deviations (6,) of a pose, or (3,) of a position."""
         return np.array([self.metres] * 3 + ([self.radians] * 3 if full_poses else []))
 
 
@@ -269,11 +270,12 @@ class Fit:
 
     Attributes:
         parameter_values: (p,) values of all parameters.
-        residuals: (s, 6) or (s, 3) measured minus computed values, in the measurements' frame, m and rad.
+        residuals: (s, 6) or (s, 3) measured minus computed values, m and rad. The frame is that of the
+            measurements.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in their units. If the noise is not stated,
-            a fit without redundancy has an infinite covariance.
-        redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
+        covariance: (k, k) covariance of the fitted parameters, in their units. Infinite for a fit without
+            redundancy and without stated noise.
+        redundancies: (s, 6) or (s, 3) redundancies 1 - H_ii of the measured coordinates.
         chi_squares: (s,) chi^2 statistic of each pose.
     """
 
@@ -295,7 +297,9 @@ class Fit:
 
     @property
     def noise_ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct.
+        """The ratio of the noise in the residuals to the stated noise.
+
+        Correctly stated noise gives a ratio of about 1.
 
         The ratio is nan if `has_redundancy` is false.
         """
@@ -341,7 +345,10 @@ def fit_parameters(
     noise: Noise | None,
     parameter_values: FloatArray,
 ) -> Fit:
-    """Fit the parameters with the indices `free_parameters`, starting from `parameter_values` (p,)."""
+    """Fit the parameters with the indices `free_parameters`.
+
+    `parameter_values` (p,) are the start values.
+    """
     problem = _LeastSquares(
         model,
         measurements,
@@ -367,7 +374,10 @@ def fit_parameters(
 
 
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
-    """Estimate at least the rounding error, because an estimate of 0 would cause a division by 0."""
+    """Estimate the noise; the minimum is the rounding error.
+
+    The estimate is a divisor and must not be 0.
+    """
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
     def estimate_deviation(part: slice, minimum: float, default: float) -> float:
@@ -420,7 +430,7 @@ class _LeastSquares:
         Q, R = np.linalg.qr(J / units)
         half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
         blocks = Q.reshape(len(self.measurements), k, len(self.free_parameters))
-        # `redundancy` contains the diagonal blocks of I - H, where H is the hat matrix.
+        # Diagonal blocks of I - H (hat matrix H).
         redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)
         own = r.reshape(-1, k)
         inverse = np.linalg.pinv(redundancy, rcond=_EIGENVALUE_CUTOFF, hermitian=True)
@@ -438,7 +448,7 @@ def reject_outliers(
     fit: Fit,
 ) -> tuple[tuple[int, ...], Fit]:
     out = list[int]()
-    # Without the outliers, there must be more measured numbers than parameters.
+    # The poses that remain must give more numbers than parameters.
     max_outliers = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
     max_outliers = min(int(_MAX_OUTLIER_FRACTION * len(measurements)), max_outliers)
     clean = fit
@@ -462,8 +472,8 @@ def select_significant(
 ) -> NDArray[np.bool_]:
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step sets the least significant change to 0, and estimates the other changes again under this
-    condition. `always_selected` marks the parameters that are always selected. Unknown covariances are inf.
+    Each step fixes the least significant change at 0. The other changes are then estimated again.
+    `always_selected` marks the parameters that are always selected. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -474,7 +484,7 @@ def select_significant(
     x, C = changes.copy(), covariance.copy()
     while (candidates := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative.
-        # The quotient is then very large, and the parameter counts as significant.
+        # Such a parameter counts as significant.
         sizes = np.abs(x[candidates]) / np.sqrt(np.maximum(C[candidates, candidates], MIN_DIVISOR))
         k = candidates[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -489,22 +499,23 @@ def select_significant(
 def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
     """Return the chi^2 quantile (Wilson and Hilferty, 1931).
 
-    The relative error is below 1 % at the probability 0.99. For 3 or more degrees of freedom, the relative
-    error is below 6 % at the probabilities from 0.9 to 0.99999.
+    The relative error is below 1 % at the probability 0.99. From 3 degrees of freedom, the error is below 6 %
+    for probabilities from 0.9 to 0.99999.
     """
     step = 2.0 / (9.0 * degrees_of_freedom)
     return degrees_of_freedom * (1.0 - step + NormalDist().inv_cdf(probability) * math.sqrt(step)) ** 3
 
 
-#: Maximum number of repetitions in the computation of start values for base and tool.
+#: Maximum number of iterations for start values.
 _MAX_START_REPETITIONS = 200
-#: The repetitions end when the relative change of the target's position is at most this number.
+#: Relative change of the target's position at which iterations end.
 _TARGET_CONVERGENCE = 1e-9
-#: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
-#: The quotient is about 1000 if positions are in millimetres by mistake.
+#: Maximum ratio: spread of measured positions / tip positions.
+#: Positions in millimetres give a ratio of about 1000.
 _MAX_SPREAD_RATIO = 100.0
-#: The spread of the tip positions counts as at least this fraction of the model's characteristic length.
-#: A tip on the last axis hardly moves, but a target beside the axis does.
+#: Minimum spread of tip positions, relative to the characteristic length.
+#: A tip on the last axis hardly moves.
+#: A target beside the last axis moves.
 _MIN_SPREAD_OF_LENGTH = 0.1
 
 
@@ -561,7 +572,10 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
 
 
 def _solve_base_tool_rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve R_B^T M_i = R_i R_X, in the linear form M_i^T R_B - R_X^T R_i^T = 0, for R_B and R_X."""
+    """Solve R_B^T M_i = R_i R_X for R_B and R_X.
+
+    The linear form is M_i^T R_B - R_X^T R_i^T = 0.
+    """
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)

@@ -1,9 +1,10 @@
-"""Model a path by parameters, and compute the Jacobian of the tip's pose with respect to the parameters.
+"""Model a path by parameters, and compute the Jacobian of the tip's pose.
 
-The parameters are numbers of a URDF's joint origins, or cells of a Denavit-Hartenberg table. A model is a
-path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint origin and a row
-of a table have this form. An elementary motion is a rotation by an angle or a translation by a length. The
-angle or length is a parameter or the value of a joint. A joint can have a gain g:
+The columns of the Jacobian are derivatives with respect to the parameters. The parameters are numbers of URDF
+joint origins, or cells of a Denavit-Hartenberg table. A model is a path (`urdfkin.model.path`). A path is the
+product of constant poses and elementary motions. A joint origin and a row of a table have this form. An
+elementary motion rotates by an angle or translates by a length. This angle or length is a parameter or the
+value of a joint. A joint can have a gain g:
 
     q              value of the joint
     (1 + g) q      angle or length of the joint's motion
@@ -11,8 +12,8 @@ angle or length is a parameter or the value of a joint. A joint can have a gain 
     q D            derivative of the tip's pose by g
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip has the same six parameters. Other fixed joints have no parameters. On a path from
-parent to child, the parameters of a fixed joint would have the same effect as those of a later joint.
+directly before the tip has the same six parameters. Other fixed joints have no parameters. A later joint's
+parameters have the same effect (on a path from parent to child).
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis
@@ -20,14 +21,16 @@ parent to child, the parameters of a fixed joint would have the same effect as t
 
 The parameter z shifts the origin along the joint's axis. A change of rz changes the zero position of a
 revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
-store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
-robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
-the tip's frame.
+store. `base` and `tool` have six parameters each. The path begins with `base`: the robot's base in the
+instrument's frame. The path ends with `tool`: the target in the tip's frame.
 
-**Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
-`PARALLEL_TOLERANCE`, the row also has Hayati's fifth parameter beta. If beta is not 0 in the original table,
-beta is always a parameter. In a row with parallel axes, d has the same effect as parameters of other rows. A
-tilt of the axis in any direction needs both alpha and beta.
+**Table.** The parameters of a row are the row's cells. Hayati's beta is a fifth parameter in two cases:
+
+- The row's axis and the next axis are parallel within `PARALLEL_TOLERANCE`.
+- beta is not 0 in the original table.
+
+With parallel axes, d has the same effect as parameters of other rows. A tilt in any direction needs both
+alpha and beta.
 """
 
 from __future__ import annotations
@@ -74,10 +77,10 @@ class ParametricMotion(ElementaryMotion):
     """An elementary motion that depends on a parameter or a joint.
 
     Attributes:
-        parameter: Index of the parameter. A joint's motion has the index of the gain; None without a gain.
-        joint: Index of the joint; None if the angle or length does not depend on a joint.
-        sense: Sign of the angle or length: -1 if the path leads from child to parent, or if the row subtracts
-            the joint's value. Else 1.
+        parameter: Index of the parameter. The parameter of a joint's motion is the gain; None without a gain.
+        joint: Index of the joint; None without a joint.
+        sense: Sign of the angle or length. -1 on a path from child to parent, or if the row subtracts the
+            joint's value. Otherwise 1.
     """
 
     parameter: int | None
@@ -105,7 +108,10 @@ class ParametricChain:
 
     @property
     def characteristic_length(self) -> float:
-        """Length (m) that converts angles to distances: the sum of the model's lengths, or 1 if it is 0."""
+        """Length (m) that converts angles to distances.
+
+        The sum of the model's lengths; 1 if this sum is 0.
+        """
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -117,7 +123,8 @@ class ParametricChain:
     def poses(self, joint_values: FloatArray, parameter_values: FloatArray | None = None) -> FloatArray:
         """Return the tip's poses (s, 4, 4).
 
-        The poses are in the instrument's frame if the model has `base` parameters, else in the base frame.
+        If the model has `base` parameters, the poses are in the instrument's frame. Otherwise, the poses are
+        in the base frame.
         """
         return self.path.poses(
             self._amounts_and_derivatives(
@@ -126,7 +133,10 @@ class ParametricChain:
         )
 
     def frames(self, joint_values: FloatArray, parameter_values: FloatArray) -> FloatArray:
-        """Return the poses (s, steps, 4, 4) after each transform of the path; the last pose is the tip's."""
+        """Return the poses (s, steps, 4, 4) after each transform of the path.
+
+        The last pose is that of the tip.
+        """
         return self.path.frames(self._amounts_and_derivatives(joint_values, parameter_values)[0])
 
     def poses_and_jacobian(
@@ -135,9 +145,10 @@ class ParametricChain:
         parameter_values: FloatArray | None = None,
         frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return tip poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
+        """Return tip poses (s, 4, 4) and their Jacobian (s, 6, p).
 
-        `frames` is the result of the method `frames` if it has already been computed.
+        The derivatives are with respect to the parameters. The linear rows come first. `frames` is the result
+        of the method `frames`, if already known.
         """
         amounts, factors = self._amounts_and_derivatives(
             joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -154,7 +165,10 @@ class ParametricChain:
     def _amounts_and_derivatives(
         self, joint_values: FloatArray, parameter_values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return (s, motions) angles or lengths, and their derivatives by the parameters."""
+        """Return angles or lengths (s, motions), and their derivatives.
+
+        The derivatives are with respect to the parameters.
+        """
         factors = np.empty((len(joint_values), len(self._parametric_motions)))
         numbers = np.ones(len(self._parametric_motions))
         for k, motion in enumerate(self._parametric_motions):
@@ -178,14 +192,14 @@ class ParametricChain:
         return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * total_length
 
 
-#: Largest angle (rad) between two axes of a table that are treated as parallel.
-#: Parallel axes of a real arm deviate by some milliradians.
+#: Maximum angle (rad) between parallel axes of a table.
+#: Parallel axes of real arms differ by some milliradians.
 PARALLEL_TOLERANCE = math.radians(5.0)
 
 PARAMETER_SETS = ("base", "tool", "offsets", "origins", "gains")
-#: Name, kind and axis of each parameter of a joint origin.
-#: The kind is True for a rotation, False for a translation. The axes 0, 1 and 2 are x, y and z.
-#: The new origin is the product of the motions in this order.
+#: (name, is_rotation, axis) of each joint origin parameter.
+#: The axes 0, 1, 2 are x, y, z.
+#: The new origin is the product in this order.
 ORIGIN_PARAMETERS = (
     ("x", False, 0),
     ("y", False, 1),
@@ -195,9 +209,10 @@ ORIGIN_PARAMETERS = (
     ("rz", True, 2),
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
-#: Parameters in order of preference; False: prismatic joint, True: another joint, base or tool.
-#: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
-#: The order is: zero position, axis, other numbers of the joint's frame, gain.
+#: Parameters in order of preference.
+#: False: prismatic joint. True: another joint, base or tool.
+#: Of parameters with the same effect, the first is fitted.
+#: Order: zero position, axis, rest of the frame, gain.
 _ORIGIN_PREFERENCES = {
     True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
     False: ("z", "rx", "ry", "x", "y", "rz", "gain"),
@@ -211,7 +226,7 @@ class CalibrationModel:
     """A parametric chain with grouped parameters.
 
     Attributes:
-        parameter_groups: Parameter indices of the base, the tool and each joint, in order of preference.
+        parameter_groups: Parameter indices in order of preference, for base, tool and each joint.
     """
 
     chain: ParametricChain
@@ -231,7 +246,7 @@ class CalibrationModel:
     def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
         """Return the changed joint origins (4, 4) by joint name.
 
-        The origin of a locked joint does not include the value at which the joint is locked.
+        The origin of a locked joint does not include the lock's value.
         """
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
@@ -338,7 +353,8 @@ class _ModelBuilder:
                 remedy="choose a path with a joint, or also fit base or tool",
             )
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # Base and tool precede the joints, because only the joints are nearly known before the fit.
+        # Only joint parameters are nearly known before the fit.
+        # So base and tool come first.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]
         )

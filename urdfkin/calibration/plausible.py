@@ -1,7 +1,7 @@
-"""Check the plausibility of a fit, and find the likeliest mistake in the data of an implausible fit.
+"""Check the plausibility of a fit, and find the likeliest mistake in the data.
 
-Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused for any of these reasons:
+Least squares also fits wrong data, for example joint values in degrees. A fit is refused for any of these
+reasons:
 
 - The rms position error is a large fraction of the robot's reach.
 - The rms position error is a smaller fraction of the reach, but a large fraction of the spread of the
@@ -14,7 +14,7 @@ joint is reversed. A fit is refused for any of these reasons:
 - The fit is inaccurate, and a correction of a common mistake in the data makes the fit much more accurate.
 - The fit changes a joint's zero by about half a turn, and the fit is plausible after such a correction.
 
-To find the likeliest mistake, the module corrects common mistakes in the data, one at a time, and fits again.
+The module corrects common mistakes in the data, one at a time. After each correction, the module fits again.
 The first correction with a plausible fit shows the likeliest mistake.
 """
 
@@ -42,37 +42,38 @@ from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, limits_with_margin
 
-#: The rms position error of a plausible fit is at most this fraction of the reach.
+#: Maximum plausible rms position error / reach.
 _MAX_ERROR_OF_REACH = 0.05
-#: A fit is not plausible if its rms position error exceeds both fractions, of the reach and of the spread.
-#: The spread is the rms distance of the measured positions from their mean.
+#: An rms position error above both fractions is not plausible.
+#: Fractions: of the reach, and of the spread.
+#: Spread: rms distance of the measured positions from their mean.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: A fit is not plausible if its rms position error exceeds both fractions.
-#: The second is a fraction of the rms position error of a fit of base and tool alone.
+#: An rms position error above both products is not plausible:
+#: fraction 1 * reach; fraction 2 * error of `base_tool_fit`.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _MAX_ORIENTATION_ERROR = 0.2
-#: If a fit exceeds one of these limits, the module searches for common mistakes in the data.
-#: The limits are for the rms position error as a fraction of the reach, and the rms orientation error (rad).
+#: Above either limit, urdfkin searches for mistakes in the data.
+#: Limits: rms position error / reach, rms orientation error (rad).
 _SUSPECT_ERROR_OF_REACH, _SUSPECT_ORIENTATION_ERROR = 0.002, 0.005
-#: Largest plausible tilt of a joint's axis (rad), and largest plausible change of a gain.
+#: Maximum plausible changes: tilt of a joint axis (rad), gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
-#: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
+#: Distinct configurations differ after rounding to this number (rad, m).
 _JOINT_VALUE_RESOLUTION = 1e-6
-#: This number of standard deviations is subtracted from a parameter's change before the limit is applied.
-#: Therefore, an uncertain change does not make a fit implausible.
+#: A limit applies to |change| - margin * standard deviation.
+#: So an uncertain change does not make a fit implausible.
 _CHANGE_MARGIN_SIGMAS = 5.0
-#: Largest error of a fit to corrected data, divided by the error of the original fit.
-#: The second ratio applies if the original fit is implausible, or changes a zero by about half a turn.
+#: Maximum error after a correction / original error.
+#: Second ratio: implausible fit, or `half_turn_zeros` is not empty.
 _MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
-#: Maximum number of corrections for which all parameters are fitted.
-#: These are the corrections with the smallest `_Trial.error_before`.
+#: Maximum number of corrections with a fit of all parameters.
+#: The corrections with the smallest `error_before` are fitted.
 _MAX_FITS = 4
-#: urdfkin tries these shifts of the rows of q relative to the poses.
-#: The shift k means that row i + k of q belongs to pose i.
+#: Tested row shifts of q relative to the poses.
+#: Shift k: row i + k belongs to pose i.
 _ROW_SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
-#: With too few configurations, urdfkin does not search for a correction of the data.
+#: Too few configurations prevent the search for a correction.
 _TOO_FEW_CONFIGURATIONS = "too few different configurations; measure poses at more configurations"
 
 
@@ -111,8 +112,8 @@ class FitWithData:
     def reach(self) -> float:
         """Reach of the original model at the measured configurations, m.
 
-        The reach is the largest distance of the tip from the base, or from the axis of a parameter rz or
-        theta. The reach is at most `characteristic_length`.
+        The reach is the tip's largest distance from the base or a rotation axis. The rotation axes are those
+        of the parameters rz and theta. The reach is at most `characteristic_length`.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
@@ -122,7 +123,10 @@ class FitWithData:
         return min(chain.characteristic_length, float(max(levers, distance))) or chain.characteristic_length
 
     def residual_deviation(self, reach: float) -> float:
-        """Return the residuals' standard deviation (m); angles are multiplied by the reach."""
+        """Return the residuals' standard deviation (m).
+
+        Angles (rad) are multiplied by the reach (m).
+        """
         return _norm(self.full_fit.residuals, reach) / math.sqrt(max(self.full_fit.total_redundancy, 1.0))
 
     def redundancy_objections(self) -> list[str]:
@@ -166,9 +170,9 @@ class FitWithData:
             yield f"the fit scales the values of joint {_join_names(gained.values())}"
 
     def half_turn_zeros(self) -> list[str]:
-        """Describe the joints with a change of the zero position by about half a turn.
+        """Describe the joints with zero positions that changed by about half a turn.
 
-        Wrong signs of the next joint's values can change the zero position by half a turn.
+        Wrong signs of the next joint's values can be the cause.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -179,9 +183,9 @@ class FitWithData:
         ]
 
     def _joint_parameter_changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield (parameter, change, lower bound of |change|) for the parameters of moving joints.
+        """Yield (parameter, change, lower bound of |change|) for moving joints.
 
-        If only positions are measured, joints with an axis that is near the target in all poses are skipped.
+        Without measured orientations, a joint is skipped if its axis is near the target in all poses.
         """
         model, fitted = self.model, self.full_fit
         near = set[str]()
@@ -271,7 +275,10 @@ def _coordinates_with_limits(model: CalibrationModel) -> Iterator[tuple[str, boo
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Configurations after correcting one mistake, for the slice first_pose:end_pose of the poses."""
+    """Configurations after correcting one mistake.
+
+    Row i of `q` belongs to pose `first_pose` + i. The rows end before `end_pose`.
+    """
 
     reason: str
     q: FloatArray
@@ -330,7 +337,7 @@ def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
 def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
     """Reverse the signs of joints one by one while the error decreases.
 
-    Return None for fewer than two reversed joints, because `_corrections` yields each single joint.
+    Return None for fewer than two reversed joints. `_corrections` yields each single joint.
     """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
@@ -355,7 +362,8 @@ class _Trial:
         self.measurements = Measurements(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = estimate_start_values(model, self.measurements)
         errors_before = _norm(compute_residuals(model, self.measurements, self.start), original.reach)
-        #: Rms error (m) of the poses for the start values; rotations (rad) are multiplied by the reach.
+        #: Rms pose error (m) at the start values.
+        #: Rotations (rad) are multiplied by the reach.
         self.error_before = errors_before / math.sqrt(len(self.measurements))
 
     @cached_property
@@ -387,5 +395,8 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm (m) of the residuals; rotations (rad) are multiplied by the reach (m)."""
+    """Return the norm (m) of the residuals.
+
+    Rotations (rad) are multiplied by the reach (m).
+    """
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))

@@ -1,4 +1,4 @@
-"""Write new joint origins into the original text of a URDF; all other bytes stay the same."""
+"""Write new joint origins into a URDF; all other bytes stay the same."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion_before_element
 from urdfkin.verify.certificate import Certificate
 
-#: Written metres and radians have 15 decimals, the precision of a double near 1.
+#: Number of decimals: the precision of a double near 1.
 _DECIMALS = 15
 _ROUNDING = 10.0**-_DECIMALS
 
@@ -33,11 +33,11 @@ _ROUNDING = 10.0**-_DECIMALS
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Write new joint origins into a URDF.
 
-    A number in the attribute xyz or rpy keeps its digits if it changes only by rounding.
+    A number of xyz or rpy keeps its digits if only rounding changes it.
 
     Args:
         data: The original URDF.
-        origins: Dictionary from the name of each changed joint to its new origin, a (4, 4) pose.
+        origins: {name of a changed joint: new origin (4, 4)}.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -64,12 +64,15 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
     if joint.origin_element is not None:
         return list(make_attribute_edits(data, joint.origin_element, values))
     written = " ".join(f'{name}="{value}"' for name, value in values.items())
-    # A valid <joint> element contains at least the elements <parent> and <child>.
+    # A valid <joint> element contains <parent> and <child>.
     return [make_insertion_before_element(data, joint.element.children[0], f"<origin {written}/>")]
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Format three numbers; a number that is equal to `old` up to rounding keeps its digits."""
+    """Format three numbers.
+
+    A number equal to `old` up to rounding keeps its digits.
+    """
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
@@ -88,7 +91,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    # If roll and yaw have the same axis, only their sum or difference is defined.
+    # At pitch ±90 degrees, roll can keep its old value.
     if math.cos(pitch) <= ANGLE_ROUNDINGS * EPS:
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
@@ -105,7 +108,7 @@ class UpdatedURDF:
 
     Attributes:
         robot: The robot before the change.
-        origins: Dictionary from the name of each changed joint to its new origin, a (4, 4) pose.
+        origins: {name of a changed joint: new origin (4, 4)}.
         certificate: Result of Pinocchio's check of the new URDF; None if not checked.
     """
 
@@ -131,7 +134,7 @@ class UpdatedURDF:
 
     @cached_property
     def displacements(self) -> dict[str, tuple[float, float]]:
-        """Displacement of each joint's origin, by joint name, as a distance (m) and an angle (rad)."""
+        """{joint name: (distance in m, angle in rad)} between old and new origin."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {

@@ -1,6 +1,6 @@
-"""Command-line interface; the module of a command is imported only when the command runs.
+"""Command-line interface. Only a running command imports its module.
 
-The summaries of commands are in this module or in `verify/quantities.py`. Therefore, `urdfkin --help` needs
+The summaries of commands are in this module or in `verify/quantities.py`. `urdfkin --help` therefore needs
 neither NumPy nor Pinocchio.
 """
 
@@ -24,8 +24,10 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Commands below each heading of the help page. Each command has a module in `urdfkin.cli` and a summary.
-#: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
+#: Maps a heading of the help page to its commands.
+#: Maps a command to a module and a summary.
+#: The function `NAME_command` of the module is the command.
+#: `make_command` makes the commands of quantities.
 _COMPUTE_HEADING = "Compute"
 _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -50,7 +52,7 @@ _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
         "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare a published table with a robot."),
         "screws": (
             "paths",
-            "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",
+            "Compute a path's product of exponentials: pose at q = 0, and joint screws.",
         ),
         "chain": ("paths", "Show the joint axes on the path between two frames."),
         "structure": ("paths", "Classify the arm along a path: wrist, parallel axes, closed-form solvers."),
@@ -169,7 +171,7 @@ def _unknown_command(name: str) -> UrdfkinError:
 
 
 class LazyGroup(click.Group):
-    """A command group that imports the module of a command only when the command is used."""
+    """A command group that imports a command's module only when the command runs."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(commands())
@@ -217,7 +219,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version
 
     click.echo(f"urdfkin {urdfkin_version()}, Pinocchio {version()}")
-    # If Pinocchio is not installed, this call raises an error.
+    # Without Pinocchio, this call raises an error.
     pinocchio()
     ctx.exit()
 
@@ -237,8 +239,8 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
-    shows the options of a command, and an example.
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. `urdfkin COMMAND --help` shows the
+    options of a command, and an example.
     """
 
 
@@ -251,6 +253,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The warning "not verified" is hidden, because the last line of the output repeats it.
+    # The last line of the output already contains "not verified".
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

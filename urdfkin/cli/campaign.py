@@ -28,13 +28,15 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Minimum time (s) between two progress lines of text, and between two progress lines of JSON.
-#: The last line of JSON is printed at once.
-_LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
+#: Minimum time between two progress lines of text, in seconds.
+_LINE_INTERVAL = 10.0
+#: Minimum time between two progress lines of JSON, in seconds.
+#: The JSON line of the last state is always printed.
+_JSON_INTERVAL = 0.5
 
 
 class SpeedEstimator:
-    """Estimates the speed of a validation in chunks per second, and the remaining time (s).
+    """Estimates a validation's speed (chunks per second) and remaining time (s).
 
     A chunk is a part of the samples of one robot.
     """
@@ -44,7 +46,8 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # Each call before the first new chunk restarts the clock, because urdfkin may compile kernels first.
+        # The measured time excludes the compilation of kernels.
+        # Each call before the first new chunk restarts the clock.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:
@@ -153,7 +156,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
 
 _MAX_FAILED = 20
-#: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
+#: Maximum number of chunks that `_seconds_per_chunk` reads.
 _MAX_TIMED_CHUNKS = 200
 
 
@@ -167,11 +170,11 @@ _MAX_TIMED_CHUNKS = 200
 def status(context: click.Context, folder: Path) -> None:
     """Show the finished and failed robots, and an estimate of the remaining time.
 
-    DIR is the folder of `urdfkin validate --store DIR`. The command reads only a few files of the
-    folder, so it is fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all
-    files.
+    DIR is the folder of `urdfkin validate --store DIR`. The command reads only a few files of the folder. The
+    command is therefore fast and does not disturb a running validation. `urdfkin report DIR` reads and checks
+    all files.
 
-    Exit 0: complete. 3: results are missing, also of the accuracy study, or a robot failed.
+    Exit 0: complete. 3: results (also of the accuracy study) are missing, or a robot failed.
     """
     from urdfkin.validation.store import Store
 
@@ -211,7 +214,7 @@ def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
-    """Print the progress of the accuracy study, and return the number of missing results."""
+    """Print the progress of the accuracy study; return the number of missing results."""
     from urdfkin.validation.store import AccuracyStore
 
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
@@ -236,7 +239,7 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
     seconds = []
     for robot in begun[:: max(1, len(begun) // _MAX_TIMED_CHUNKS)][:_MAX_TIMED_CHUNKS]:
         answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
-        # A damaged file is counted in `counts`, but has no result.
+        # `counts` includes damaged files, which contain no result.
         if (one := next((x.seconds for x in answers if isinstance(x, ChunkResult)), None)) is not None:
             seconds.append(one)
     return sum(seconds) / len(seconds) if seconds else None
@@ -250,11 +253,11 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
 @click.argument("folder", metavar="DIR", type=FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Copy the results of several stores of the same validation into the folder DIR.
+    """Copy a validation's results from several stores into the folder DIR.
 
-    Each STORE is a folder that `urdfkin validate --store` wrote, for example on another machine. Results of
-    the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
-    DIR is made if it does not exist.
+    Each STORE is a folder that `urdfkin validate --store` wrote. The folders can come from several machines.
+    Results of the accuracy study are copied too. Each file is read and checked; damaged files are reported
+    and skipped. DIR is made if it does not exist.
     """
     from urdfkin.validation.store import AccuracyStore, Store, open_store
 

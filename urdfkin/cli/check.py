@@ -63,17 +63,16 @@ class CheckOutcome:
     """The results of all files.
 
     Attributes:
-        silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
-            comment.
-        excerpts: The faulty line, and a line with carets, of each finding; None if the finding marks no text.
+        silenced_findings: Findings that a comment suppresses, each with the comment's reason.
+        excerpts: For each finding, the faulty line and a line of carets. None: the finding marks no text.
         known_count: Number of findings that the baseline file suppresses.
-        obsolete_count: Number of findings in the baseline file that the checked files no longer have.
+        obsolete_count: Number of findings that only the baseline file still contains.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
-        files_with_errors: Files with a reported finding of severity error. --fix does not change these files.
-            A warning that --strict reports as an error does not count.
+        files_with_errors: Files with a reported error. The option --fix does not change these files. A
+            warning that --strict reports as an error does not count.
         files_with_mark: Files that begin with a byte order mark.
-        unwritable: Names of inputs that --fix cannot change: standard input, a pipe, an expanded .xacro file,
-            or a robot of the catalogue.
+        unwritable: Names of inputs that --fix cannot change. Such inputs are standard input, pipes, expanded
+            .xacro files and robots of the catalogue.
     """
 
     files: list[str] = field(default_factory=list)
@@ -170,7 +169,7 @@ def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS_KEY = "urdfkin.settings"
-#: Settings in pyproject.toml that replace the defaults of options
+#: Settings in pyproject.toml that replace defaults.
 _OPTION_SETTINGS = ("select", "ignore", "exclude", "strict", "notes")
 
 
@@ -196,15 +195,15 @@ finding_options = combine(
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Report only findings with this code (URDF502), name (axis-not-unit) or family (URDF5);"
-        " repeatable, or separated by commas.",
+        help="Report only this code (URDF502), name (axis-not-unit) or family (URDF5). Repeatable, or"
+        " separated by commas.",
     ),
     click.option(
         "--ignore",
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Leave out findings with this code, name or family; repeatable, or separated by commas.",
+        help="Leave out this code, name or family. Repeatable, or separated by commas.",
     ),
     click.option("--strict/--no-strict", default=False, help="Report warnings as errors."),
     click.option("--notes/--no-notes", default=True, help='Also report findings of severity "note".'),
@@ -273,7 +272,7 @@ size_limit_options = combine(
 @click.option(
     "--unsafe-fixes",
     is_flag=True,
-    help="With --fix or --diff: include fixes that rotate a joint by more than a rounding error.",
+    help="With --fix or --diff: include fixes that rotate a joint beyond rounding errors.",
 )
 @click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
 @click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")
@@ -281,25 +280,28 @@ size_limit_options = combine(
 @click.option(
     "--each",
     is_flag=True,
-    help="Print each finding on its own line; by default, many findings of one kind share a line.",
+    help="Print each finding on its own line. By default, findings of one kind share a line.",
 )
 @mimic_option("Check mimic joints as coupled joints, or as free joints.", "mimic")
 @root_joint_option(
-    "With this root joint, a joint with the name root_joint or a link with the name universe is an error."
+    "Check for this root joint: the names root_joint (joint) and universe (link) are then errors."
 )
 @source_options
 @settings_file_options
 @size_limit_options
 @click.pass_context
 def check_command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
-    """Check URDF files and print the findings, each with its code, line, cause and remedy.
+    """Check URDF files and print all findings, with code, line, cause and remedy.
 
-    A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard
-    input. For a FOLDER, the command checks the *.urdf files in the folder and its subfolders, except hidden
-    subfolders. Without FILE and FOLDER, the current folder is checked. A .xacro file is expanded in a
-    restricted process. The process can only compute, and read files in certain folders such as the .xacro
-    file's package (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request.
-    Settings are in the table [tool.urdfkin] of pyproject.toml (docs/check.md).
+    A FILE is the path of a URDF, USD or MJCF file. FILE can also be a name from `urdfkin robots`, or - for
+    standard input. In a FOLDER and its subfolders, the command checks all *.urdf files. Hidden subfolders are
+    skipped. Without FILE and FOLDER, the current folder is checked.
+
+    A .xacro file is expanded in a restricted process. This process can only compute, and read certain folders
+    (docs/xacro.md). One of these folders is the file's package.
+
+    The option --changed-since origin/main reports the new findings of a pull request. Settings are in the
+    table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
     Exit 0: no error. 1: an error. 2: an unreadable file or a wrong option. With --diff, exit 0: no changes.
     1: changes.
@@ -397,7 +399,7 @@ class CheckRun:
     """One check of many files.
 
     Attributes:
-        fold: Whether many findings with the same code share a line of output; see `urdfkin.check`.
+        fold: Whether findings with one code share an output line; see `urdfkin.check`.
         has_usd: Whether a USD file was among the files.
         writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
@@ -429,7 +431,7 @@ class CheckRun:
                 self._checked_files.add(file)
                 self.has_usd = self.has_usd or is_usd(file)
                 try:
-                    # A file that the user named directly may be a pipe.
+                    # Only files on the command line may be pipes.
                     if file not in (word, f"./{word}"):
                         require_regular_file(Path(file))
                     self._check(str(resolve_package_uri(file)))
@@ -491,7 +493,9 @@ class CheckRun:
         self.outcome.add(file, Examination(text, data.removeprefix(codecs.BOM_UTF8), None, findings, ()))
 
     def _is_unchanged(self, data: bytes, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
-        """Return whether a file with `data` and its included files are the same as in `commit_files`.
+        """Return whether a file and its included files are unchanged since a commit.
+
+        The file contains `data`, and the commit contains `commit_files`.
 
         Every file of the commit with a suffix in `suffixes` counts as included. A file that contains the name
         of a deleted file counts as changed.
@@ -515,7 +519,7 @@ class CheckRun:
             self.outcome.fixable_count += len(result.fixed_findings)
             self.outcome.patches.append(make_patch(file, text.data, result.text.data, escape_for_terminal))
             chosen, findings = make_predicate(), self.examine_text(result.text).findings
-            # --fix does not change a file with an error.
+            # `--fix` does not change a file with an error.
             if not any(finding.severity is Severity.ERROR for finding in findings):
                 self.outcome.unsafe_count += sum(
                     chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.allows_unsafe_fixes
@@ -549,7 +553,7 @@ def _find_writable_path(text: UrdfText) -> Path | None:
     return None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
 
 
-#: Suffixes of MJCF files and of files that an MJCF file includes
+#: Suffixes of MJCF files and included MJCF files.
 _MJCF = (".xml", ".mjcf")
 
 
@@ -560,7 +564,7 @@ def _is_usd_or_mjcf(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            # This return avoids the import below, which loads NumPy.
+            # This return avoids the import of NumPy below.
             return False
     from urdfkin.urdf.mjcf import is_mjcf
 

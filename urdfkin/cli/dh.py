@@ -24,8 +24,8 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import Answer, answer_command, report_compilation
 from urdfkin.cli.shell import complete_table
 
-#: The formats urdf and svg, and a copy of `urdfkin.dh.export.FORMATS`.
-#: An import of that module would slow --help down.
+#: Copy of `urdfkin.dh.export.FORMATS`, plus `urdf` and `svg`.
+#: An import of `urdfkin.dh.export` would slow `--help` down.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
@@ -71,27 +71,27 @@ derivation_options = combine(
     _choice(
         "--near-parallel",
         ("hayati", "strict"),
-        "Parameters for nearly parallel joint axes. hayati: rows with five parameters, including the angle"
-        " beta. strict: rows with four parameters, which may contain very large offsets.",
+        "Parameters for nearly parallel joint axes. hayati: five parameters, including the angle beta."
+        " strict: four parameters, with possibly very large offsets.",
     ),
     click.option(
         "--snap",
         type=FiniteNumber(),
         default=0.0,
         metavar="RAD",
-        help="Round an angle (rad) to a multiple of 15 degrees if the difference is at most this tolerance.",
+        help="Largest change (rad) of an angle that is rounded to a multiple of 15 degrees.",
     ),
     _choice(
         "--last",
         ("tip", "flange"),
-        "Place the last frame at the tip, or at the flange with a tool transform to the tip.",
+        "Position of the last frame. tip: at the tip. flange: at the flange; a tool transform leads to the"
+        " tip.",
     ),
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rows that contain the offsets d of consecutive parallel axes. last: the last of these rows"
-        " contains their sum. first: the first of these rows contains their sum. each: each row contains the"
-        " offset of its own link.",
+        "Rows with the offsets d of consecutive parallel axes. last: the last row contains their sum."
+        " first: the first row contains their sum. each: each row contains its own link's offset.",
     ),
     click.option(
         "--flip",
@@ -107,14 +107,14 @@ derivation_options = combine(
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "Rule that chooses one of the two directions of each x axis. theta: |theta| is at most 90 degrees."
+        "Rule for the direction of each x axis. theta: |theta| is at most 90 degrees."
         " a: the length a is not negative. alpha: the angle alpha is not negative.",
     ),
     _choice(
         "--slide",
         ("drawn", "minimal"),
-        "Position of a prismatic joint's axis. drawn: the axis is as in the URDF. minimal: the axis"
-        " passes through the origin of the next or previous revolute joint, so that the length a is 0.",
+        "Position of a prismatic joint's axis. drawn: as in the URDF. minimal: through the origin of the"
+        " next or previous revolute joint; the length a is 0.",
     ),
     click.option(
         "--like",
@@ -128,7 +128,7 @@ compare_options = combine(
         "--compare",
         metavar="TABLE",
         shell_complete=complete_table,
-        help="Compare ROBOT with this table: a file, or the name of a reference table, such as ur5.",
+        help="Compare ROBOT with this table: a file, or a reference table's name such as ur5.",
     ),
     click.option(
         "--tolerance",
@@ -140,8 +140,7 @@ compare_options = combine(
     click.option(
         "--fit/--no-fit",
         default=True,
-        help="With --compare: fit the base, tool, joint offsets and joint signs of the table to ROBOT before"
-        " the comparison.",
+        help="With --compare: first fit the table's base, tool, joint offsets and joint signs.",
     ),
 )
 form_options = combine(
@@ -158,11 +157,11 @@ form_options = combine(
 )
 
 
-#: Options that cannot be combined with --like.
-#: With --like, a published table determines the values of these options.
+#: With `--like`, a published table determines these options.
 _OPTIONS_FIXED_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 _DERIVATION_OPTIONS = ("convention", "near_parallel", "snap", "slide", "like", *_OPTIONS_FIXED_BY_LIKE)
-#: If ROBOT is a Denavit-Hartenberg table, only these options make the command derive a new table.
+#: Options that require a new derivation of a table.
+#: Without these options, a table as ROBOT stays unchanged.
 _NEW_TABLE_OPTIONS = ("base", "tip", "all_", "lock", "joints", *_DERIVATION_OPTIONS[1:])
 _PRINTED_TABLE_OPTIONS = ("degrees", "millimetres", "digits", "columns")
 
@@ -199,12 +198,12 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
-    The path may go down or up the tree of links, or first up and then down. The table has the file's angles
-    and lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip.
+    The path may go down, up, or first up and then down. The table has the file's angles and lengths, without
+    rounding. The option --snap rounds angles, and prints a bound on the tip's displacement.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
-    .tsv, .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention.
-    An option that affects the rows, such as --tip or --snap, makes the command derive a new table. See
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be a table (.toml,
+    .json, .csv, .tsv, .md, .tex, .txt). The command then writes the same table in the chosen convention.
+    Options such as --tip and --snap affect the rows. With these options, the command derives a new table. See
     `urdfkin explain urdf-to-dh`.
 
     Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, or the compared table differs or

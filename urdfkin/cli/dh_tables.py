@@ -55,11 +55,12 @@ from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
 _MULTI_TABLE_FORMATS = ("terminal", "markdown", "latex", "json")
-#: Formats in which the result of the check is printed below the table
+#: Formats with the check's result below the table.
 _FORMATS_WITH_CHECK_LINE = ("terminal", "markdown")
 _DOCUMENT_FORMATS = (*_FORMATS_WITH_CHECK_LINE, "html", "latex")
-#: Number of significant digits of the base and tool transforms in formats with rounded numbers.
-#: None means the value of --digits.
+#: Significant digits of the base and tool transforms.
+#: The mapping contains all formats with rounded numbers.
+#: None means the value of `--digits`.
 _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -67,8 +68,8 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `unchanged_table` is the path of a table or screws if no option in `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is
-    given, else None. `dh_arguments` are arguments of `Robot.dh`.
+    `unchanged_table` is the path of a table or of screws. None: the input is another file, or an option in
+    `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given. `dh_arguments` are arguments of `Robot.dh`.
     """
 
     robot: Robot
@@ -155,7 +156,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged_table is not None:
         table = read_table_or_screws(expand_home(request.unchanged_table))
-        # For screws, the rest of this function derives a table.
+        # For screws, the code below derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None
@@ -170,9 +171,9 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
 
 
 def _with_link_frames(request: DHRequest, table: DHTable) -> DHTable:
-    """In the robot made from a table, a joint can have the name of the table's base or tip."""
+    """Name base and tip as links, because joints can have equal names."""
     links = link_names(table)
-    # A table that is derived from screws already has unambiguous names, such as "link:tip".
+    # A table from screws already has names such as "link:tip".
     if request.unchanged_table is None or not {links[0], links[-1]} <= set(request.robot.tree.links):
         return table
     return replace(table, base_frame=LinkFrame.of(links[0]), tip_frame=LinkFrame.of(links[-1]))
@@ -282,8 +283,8 @@ def _better_interpretation(
         return None
     metres = found.metres
     if not found.is_fitted:
-        # `find_better_interpretation` needs the tip error after a fit.
-        # With --no-fit, `found.metres` is the tip error without a fit.
+        # The search below needs the tip error after a fit.
+        # With `--no-fit`, `found.metres` is an error without a fit.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None

@@ -1,4 +1,4 @@
-"""`urdfkin explain`: print the page about a finding, an equation, or a question of docs/questions.md."""
+"""`urdfkin explain`: print the page about a finding, an equation or a question."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ _CODE_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return the sections of docs/questions.md, by the anchor of each heading; links become plain text."""
+    """Map each heading's anchor to its section of docs/questions.md.
+
+    Links become plain text.
+    """
     return {
         make_anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip()
         for text in _question_sections()[1:]
@@ -39,7 +42,10 @@ def find_answer(topic: str) -> str | None:
 
 
 def format_answer(answer: str) -> str:
-    """Format a section for a terminal; the setup code of Python examples is at the end."""
+    """Format a section for a terminal.
+
+    The setup code of Python examples is at the end.
+    """
     pieces = _CODE_BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
@@ -61,7 +67,10 @@ def make_anchor(heading: str) -> str:
 
 
 def _question_sections() -> list[str]:
-    """Split docs/questions.md at its headings; the first part has the setup code of all examples."""
+    """Split docs/questions.md at its headings.
+
+    The first part contains the setup code of all examples.
+    """
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 
@@ -74,11 +83,17 @@ def _indent(code: str) -> str:
 def explain_command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
-    CODE is a finding's code or its short name. The page of a finding has the reason, a bad and a good
-    example, and the behaviour of other programs. EQUATION is the number of an equation in the textbook, such
-    as 7.130. The page of an equation has the equation, the function that implements the equation, and the
-    check of this function. QUESTION is the name of a question, or a word of the name. WORD is any other word,
-    such as jacobian. For WORD, the command lists the codes and equations whose description contains the word.
+    CODE is a finding's code or its short name. A finding's page has the reason, a bad example and a good
+    example. The page also describes the behaviour of other programs.
+
+    EQUATION is the number of an equation in the textbook, such as 7.130. The page has the equation, the
+    implementing function, and the function's check.
+
+    QUESTION is the name of a question, or a word of the name.
+
+    WORD is any other word, such as jacobian. The command lists the codes and equations with this word in
+    their description.
+
     Without an argument, the command lists all codes, sections with equations, and questions.
 
     \b
@@ -126,7 +141,7 @@ def explain_command(topic: str | None) -> None:
 
 
 def _list_matches(topic: str) -> list[str]:
-    """Return a line for each code and equation whose description contains all words of `topic`."""
+    """Return a line for each code and equation with all words of `topic`."""
     words = topic.lower().split()
     if not any(map(str.isalpha, topic)):
         return []

@@ -13,6 +13,7 @@ import click
 
 from urdfkin.cli.options import (
     FILE,
+    FILE_OR_FOLDER,
     format_from_suffix,
     frame_option,
     load_robot,
@@ -41,7 +42,7 @@ from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
 
-#: Languages that a file with each suffix may contain. Without --to, the first language is chosen.
+#: Maps a suffix to languages. Without `--to`, the first language applies.
 _LANGUAGES_OF_SUFFIXES = {
     **dict.fromkeys((".c", ".h"), ("c",)),
     **dict.fromkeys((".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx"), ("cpp",)),
@@ -50,13 +51,13 @@ _LANGUAGES_OF_SUFFIXES = {
     ".m": ("matlab",),
     ".tex": ("latex",),
 }
-#: Common names of languages and libraries, each with the name that --to accepts.
+#: Maps a common name to the name that `--to` accepts.
 _LANGUAGE_SYNONYMS = {
     "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
 }  # fmt: skip
 
 
-class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
+class _Language(click.Choice):  # type: ignore[type-arg]  # generic only since click 8.2
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if (name := _LANGUAGE_SYNONYMS.get(str(value).lower())) is not None:
             self.fail(f"{value!r} is not the name of a language; did you mean {name}?", param, ctx)
@@ -87,8 +88,8 @@ class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a
     "--form",
     type=click.Choice(tuple(FORMS)),
     default="tree",
-    help="Robot description from which the code is made: the joints of the URDF (tree), a Denavit-Hartenberg"
-    " table (dh), or screws.",
+    help="Source of the code. tree: the joints of the URDF. dh: a Denavit-Hartenberg table. screws: the"
+    " joints' screws.",
 )
 @click.option(
     "--name",
@@ -114,13 +115,16 @@ def export_command(
     verify: bool,
     output: Path | None,
 ) -> None:
-    """Write a frame's kinematics as code without loops, for one robot, with test vectors in the file.
+    """Write a frame's kinematics as code without loops, with test vectors.
 
-    The robot's constants are part of the code, and each joint's sine and cosine are computed once. urdfkin
-    compares the expressions with Pinocchio before the file is written. The file states the largest
-    disagreement of each quantity. The file also contains test vectors with true values at fifty digits.
-    --check compiles or imports a file and runs its test vectors. You can also run the test vectors without
-    urdfkin. ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
+    The code contains the robot's constants. Each joint's sine and cosine are computed once. Before the
+    command writes the file, Pinocchio checks the expressions. The file states the largest disagreement of
+    each quantity.
+
+    The file also contains test vectors with true values at fifty digits. The option --check compiles or
+    imports a file and runs its test vectors. You can also run the test vectors without urdfkin.
+
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input.
 
     Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
     3: not verified, or changed after it was written.
@@ -171,44 +175,45 @@ _EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 def vectors_command() -> None:
     """Write test vectors for other programs.
 
-    A library in any language can compare its results with these test vectors. docs/vectors.md explains the
-    comparison.
+    A library in any language can compare its results with these test vectors. The page docs/vectors.md
+    explains the comparison.
     """
 
 
 @vectors_command.command(
     "write", short_help="Write test vectors into a folder.", epilog=f"Example: {_EXAMPLE}"
 )
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path), required=False)
+@click.argument("folder", metavar="DIR", type=FILE_OR_FOLDER, required=False)
 @click.argument("robots", metavar="[ROBOT]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
     "--catalogue/--no-catalogue",
     default=True,
-    help="Without ROBOT: write test vectors of the robots of the catalogue, in addition to those of the small"
-    " robots. Test vectors of the catalogue refer to files of example-robot-data.",
+    help="Without ROBOT: also write test vectors of the catalogue. These test vectors refer to files of"
+    " example-robot-data.",
 )
 @samples_option(
     3,
-    "Number of configurations of each robot. In the first configuration, each joint is at 0, or at the limit"
-    " nearest to 0.",
+    "Number of configurations of each robot. In the first configuration, joints are at 0, or at the nearest"
+    " limit.",
     minimum=1,
     maximum=1000,
 )
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
 @answer_command()
 def write_vectors(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
-    """Write test vectors into the folder DIR: inputs and results, with a tolerance for every result.
+    """Write test vectors (inputs, results and tolerances) into the folder DIR.
 
     The results are computed at 50 digits, and written with 17 digits.
 
-    If you name one or more robots, the command writes only the test vectors of the named robots. If you name
-    no robot, the command writes test vectors of the robots of the catalogue and of some 70 small robots. Each
-    small robot tests one feature of URDF. Each robot has a JSON file, and a text file with the same numbers,
-    separated by tabs. The file SHA256SUMS has the digests of all files.
+    The command writes the test vectors of the named robots. Without a name, the catalogue and some 70 small
+    robots are used. Each small robot tests one feature of URDF. Each robot has a JSON file and a text file.
+    The text file contains the same numbers, separated by tabs. The file SHA256SUMS has the digests of all
+    files.
 
-    The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
-    spatial acceleration. The files contain the placement once, and each other quantity in the reference
-    frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on --samples.
+    The results are placement, velocity, Jacobian, Jacobian rate and Hessian. The classical and the spatial
+    acceleration are results too. The files contain the placement once. All other quantities are in the
+    reference frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on
+    --samples.
     """
     from urdfkin.validation import vectors
 

@@ -37,13 +37,12 @@ if TYPE_CHECKING:
     from urdfkin.comparison.result import SameQuestion
     from urdfkin.robot import Robot
 
-#: Options of `urdfkin same` that need exactly two robots
+#: Options of `urdfkin same` that need exactly two robots.
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: Options of `urdfkin same` that affect only a new comparison, and the option --recheck.
-#: --recheck cannot be combined with the other options of this tuple.
+#: `recheck`, and the options that `--recheck` excludes.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
-#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf. `urdfkin diff` rejects revisions.
-#: A file with such a name is accepted.
+#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
+#: `urdfkin diff` accepts a file with such a name.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 
@@ -61,32 +60,32 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--strict",
     is_flag=True,
-    help="Exit with 1 if the models are equivalent only after changes of B. Also exit with 1 if the command"
-    " lists any other difference, for example of limits, joint types or links.",
+    help="Exit with 1 if the models are equivalent only after changes of B. The same applies to other"
+    " differences, such as limits, joint types or links.",
 )
 @click.option(
     "--within",
     type=NumberInRange(0.0),
-    help="Largest allowed distance (m) and angle (rad) between a frame of A and the same frame of B. The exit"
-    " code is 0 only if urdfkin proves that no distance or angle exceeds this number.",
+    help="Largest allowed distance (m) and angle (rad) between matching frames of A and B. The exit code is 0"
+    " only if urdfkin proves this limit.",
 )
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes (parts of the joint space) in memory during the search for sharper upper"
-    " bounds. 0: no search.",
+    help="Maximum number of boxes (parts of the joint space) in memory. A search with boxes sharpens the"
+    " upper bounds. 0: no search.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
 @click.option(
     "--certificate",
     type=FILE,
-    help="Also write the result to this file as a JSON certificate. --recheck verifies a certificate.",
+    help="Also write a JSON certificate to this file. The option --recheck verifies a certificate.",
 )
 @click.option(
     "--write-map",
     type=FILE,
-    help="Also write the names, order, signs and zero positions of B's joints to this TOML file. The option"
+    help="Also write the names, order, signs and zeros of B's joints to this TOML file. The option"
     " --convention of other commands reads the file.",
 )
 @click.option(
@@ -96,7 +95,7 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--html",
     type=FILE,
-    help="Also write an HTML page to this file, with a picture of both robots at the worst configuration.",
+    help="Also write an HTML page to this file. The page shows A and B at the worst configuration.",
 )
 @schema_option("urdfkin.comparison.certificate:SAME", "a certificate")
 @source_options
@@ -115,26 +114,31 @@ def same_command(
 ) -> Answer:
     """Prove whether A and B are the same robot in every configuration.
 
-    If you name more than two robots, the command compares each pair. A and B are paths, names that `urdfkin
-    robots` lists, or Denavit-Hartenberg tables. A and B are the same robot if the screws of all joints and
-    the zero-configuration poses of all links agree. Fixed links, names and the order of joints may differ. A
-    and B are equivalent if some changes of B make B the same robot as A. For example, B may need another base
-    pose, or another zero position of a joint.
+    If you name more than two robots, the command compares each pair. A and B are paths, names from `urdfkin
+    robots`, or Denavit-Hartenberg tables.
 
-    If A and B differ, the command compares each frame of B with the same frame of A. For the largest distance
-    between the two frames, the command prints a lower and an upper bound. The command also prints a
-    configuration in which the distance is at least the lower bound. The upper bound is proven for all
-    configurations within the joint limits.
+    A and B are the same robot if all joint screws agree. In the zero configuration, all link poses must also
+    agree. Fixed links, names and the order of joints may differ.
 
-    The numbers of a USD file are rounded to single precision. If these rounding errors explain the
-    difference of every joint, A and B are the same up to single precision.
+    Some changes of B can make B the same robot as A. A and B are then equivalent. For example, B may need
+    another base pose, or another joint zero.
+
+    If A and B differ, the command compares matching frames. For the largest distance, the command prints a
+    lower and an upper bound. In the printed configuration, the distance is at least the lower bound. The
+    upper bound is proven for all configurations within the joint limits.
+
+    The numbers of a USD file are rounded to single precision. These rounding errors may explain the
+    difference of every joint. A and B are then the same up to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
-    1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are
-    equivalent only after changes of B. Some differences have no effect on motion, for example other limits,
-    the type revolute instead of continuous, or an additional fixed link. With --strict, the exit code is also
-    1 for such differences. With --within, the command does not change B before the comparison. Exit 0: every
-    frame is proven to be within the given distance. 1: the proof fails for at least one frame.
+    1: the models are different. 2: bad input.
+
+    With --strict, the exit code is also 1 for equivalent models. The same applies to differences without
+    effect on motion. Examples are other limits, revolute instead of continuous joints, or additional fixed
+    links.
+
+    With --within, the command does not change B before the comparison. Exit 0: every frame is proven to be
+    within the given distance. 1: the proof fails for at least one frame.
     """
     from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate
@@ -224,14 +228,15 @@ def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @source_options
 @answer_command()
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
-    """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
+    """List all changes from OLD to NEW, and the displacements of frames.
 
-    For each changed joint, the command prints the frame that the joint's changes displace most. The printed
-    displacement is the largest in all configurations within the joint limits. If the changes only rotate
-    frames, the command prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The
-    last line of the output is the largest displacement by all changes together. If OLD and NEW have different
-    formats (URDF, MJCF or USD), the command prints the differences that `urdfkin same` finds. If you name
-    more than two robots, the command compares each pair.
+    For each changed joint, the command prints the most displaced frame. The printed displacement is the
+    largest in all configurations within the joint limits. If the changes only rotate frames, the command
+    prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The last line is the
+    largest displacement by all changes together.
+
+    OLD and NEW may have different formats (URDF, MJCF or USD). The command then prints the differences that
+    `urdfkin same` finds. If you name more than two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
@@ -288,13 +293,13 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 @seed_option
 @answer_command()
 def readers_command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
-    """Compare how other libraries read ROBOT: the joints, the joint order, and the poses of all links.
+    """Compare how other libraries read ROBOT: joints, joint order and link poses.
 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
     Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each
     library reads the file in its own process. The command compares the poses of all links with urdfkin's
-    poses. If a library reads a joint differently, the command names the element of the file that causes the
-    difference, for example the joint's `axis`.
+    poses. For a joint that a library reads differently, the command names the cause. An example is the
+    joint's `axis`.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """

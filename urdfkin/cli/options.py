@@ -32,8 +32,19 @@ if TYPE_CHECKING:
     from urdfkin.robot.trajectory import Trajectory
     from urdfkin.verify.oracles import OracleName
 
-FILE = click.Path(path_type=Path, dir_okay=False)
-FOLDER = click.Path(path_type=Path, file_okay=False)
+
+class _NonEmptyPath(click.Path):
+    """A path; the empty string is an error, because `Path("")` is the current folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "":
+            self.fail("the path is empty.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+FILE = _NonEmptyPath(path_type=Path, dir_okay=False)
+FOLDER = _NonEmptyPath(path_type=Path, file_okay=False)
+FILE_OR_FOLDER = _NonEmptyPath(path_type=Path)
 
 
 class WholeNumber(click.IntRange):
@@ -62,11 +73,13 @@ def format_from_suffix(
     default_format: str,
     parameter: str = "format_",
 ) -> str:
-    """Return the output format that an option or the suffix of the output file selects.
+    """Return the output format from an option or the output file's suffix.
 
     `parameter` is the name of the option's value in `context.params`. `formats` lists the formats of each
-    suffix, for example `{".py": ("numpy", "sympy")}`. The first format is the default. Raise InputError if
-    the option contradicts the suffix, or if the suffix is unknown and the option is not given.
+    suffix, for example `{".py": ("numpy", "sympy")}`. The first format is the default.
+
+    Raise InputError if the option contradicts the suffix. Without the option, an unknown suffix also raises
+    InputError.
     """
     format_: str = context.params[parameter] or default_format
     if output is None:
@@ -98,7 +111,7 @@ def is_on_command_line(context: click.Context, name: str) -> bool:
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
-    """Raise InputError, such as "--format does nothing with --opw", for an option without effect."""
+    """Raise an InputError such as "--format does nothing with --opw"."""
     for parameter in context.command.params:
         if parameter.name in unused and is_on_command_line(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
@@ -108,7 +121,7 @@ def reject_unused_options(context: click.Context, unused: Collection[str], becau
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: Number of samples that an option with the value `random` draws, for example `--q random`.
+#: Number of samples for the word `random` without a count.
 _RANDOM_SAMPLES = 1
 
 
@@ -127,7 +140,7 @@ _LOAD_OPTIONS_KEY = "urdfkin.load_options"
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
     """Return a callback that stores an option's value for `load_options`.
 
-    With `always`, the callback also stores the value of an option that the user omits.
+    With `always`, the callback also stores the default of an omitted option.
     """
 
     def store_option(context: click.Context, _: click.Parameter, value: Any) -> None:
@@ -214,8 +227,8 @@ robot_options = combine(
         metavar="NAME=VALUE",
         expose_value=False,
         callback=_store_as("lock", ", ".join),
-        help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be the name of a pose, such as ready. The pose then sets each"
+        help="Fix a joint at a value; repeatable. A fixed joint has no entry in q, v and the Jacobian."
+        " With --joints, the first --lock may be a pose's name, such as ready. The pose then sets each"
         " fixed joint that has no --lock value.",
     ),
     click.option(
@@ -223,8 +236,8 @@ robot_options = combine(
         metavar="NAMES",
         expose_value=False,
         callback=_store_as("joints", lambda words: [name.strip() for name in words.split(",")]),
-        help="Keep only these joints, separated by commas. All other joints are fixed at their --lock values,"
-        " or at 0 without such a value.",
+        help="Keep only these joints, separated by commas. All other joints are fixed at their --lock value,"
+        " or at 0.",
     ),
 )
 robot_argument = combine(
@@ -245,7 +258,7 @@ path_options = combine(
 )
 
 
-class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic only since click 8.2
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             return super().convert(value, param, ctx)
@@ -281,8 +294,8 @@ def _values_option(name: str, help_: str) -> Callable[[_F], _F]:
 
 q_option = _values_option(
     "--q",
-    "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready', a"
-    " pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'.",
+    "Configuration. Numbers: '0,30deg,pi/2'. Names: 'shoulder=30deg,elbow=0.5'. A pose: 'ready'. A changed"
+    " pose: 'ready,elbow=0.5'. A batch: '@FILE.csv'. Random: 'random', 'random:N'.",
 )
 v_option = _values_option("--v", "Joint velocities, in the format of --q; 'neutral' means zero.")
 a_option = _values_option("--a", "Joint accelerations, in the format of --q; 'neutral' means zero.")
@@ -305,8 +318,8 @@ convention_of_input_option = _convention_option("the joint values that are read"
 
 def trajectory_option(help_: str) -> Callable[[_F], _F]:
     files = (
-        "A CSV file has a column NAME for each joint, and may have the columns t, v:NAME and a:NAME. A column"
-        " may state its unit, such as 'elbow [deg]'. An .npz file has the array q, and may have t, v and a."
+        "A CSV file has a column NAME for each joint. The columns t, v:NAME and a:NAME are optional. A column"
+        " may state its unit, such as 'elbow [deg]'. An .npz file has the array q; t, v and a are optional."
     )
     return click.option("--trajectory", type=FILE, help=f"{help_} {files}")
 
@@ -354,7 +367,7 @@ def lock_settings(robot: Robot) -> dict[str, Any]:
 
 
 def locked_line(robot: Robot) -> str:
-    """Return one line with the value of each locked joint, or "" if no joint is locked."""
+    """Return a line with the value of each locked joint, or ""."""
     units = {name: "rad" if robot.joints[name].original.kind.turns else "m" for name, _ in robot.origin.lock}
     values = ", ".join(f"{name} at {value:.6g} {units[name]}" for name, value in robot.origin.lock)
     return f"locked: {values}" if values else ""
@@ -403,7 +416,7 @@ class Inputs:
         return replace(self, settings={**self.settings, **more})
 
 
-#: The family of findings about masses, shapes and colours.
+#: Prefix of the codes about masses, shapes and colours.
 _NON_KINEMATIC_FINDINGS = "URDF7"
 
 
@@ -430,7 +443,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def disabled_options(source: str) -> dict[str, Any]:
-        """Disable the options for xacro and USD files that apply only to another source."""
+        """Disable options for xacro and USD files that do not apply to `source`."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -452,10 +465,10 @@ def read_inputs(
     option: str = "--q",
     conversion: Conversion | None = None,
 ) -> Inputs:
-    """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
+    """Read q, v and a, and convert them from `conversion` to urdfkin's convention.
 
-    A single sample of q, v or a is repeated for all samples of the other arrays. If `option`, the option for
-    q, is not --q, the caller must reject an unused --seed.
+    A single sample is repeated for all samples of the other arrays. The argument `option` is the option for
+    q. If `option` is not --q, the caller must reject an unused --seed.
     """
     import numpy as np
 
@@ -525,8 +538,8 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample per line.
 
-    A layout is a list of column names. Return the samples, and the layout with as many names as the file has
-    columns. `units` is as in `read_columns`.
+    Return the samples, and the layout that fits the file's number of columns. A layout is a list of column
+    names. `units` is as in `read_columns`.
     """
     import numpy as np
 
@@ -564,19 +577,18 @@ _BASE_MOTION_OPTIONS = {
     "q": click.option(
         "--base-placement",
         metavar="VALUES",
-        help="Pose of the root link in the world, in m and rad: x,y,z,roll,pitch,yaw or x,y,z,qx,qy,qz,qw or"
+        help="Pose of the root link in the world (m, rad): x,y,z,roll,pitch,yaw or x,y,z,qx,qy,qz,qw or"
         " @FILE.csv.",
     ),
     "v": click.option(
         "--base-velocity",
         metavar="VALUES",
-        help="Velocity of the root link in the world's axes, in m/s and rad/s: vx,vy,vz,wx,wy,wz or"
-        " @FILE.csv.",
+        help="Velocity of the root link in world axes (m/s, rad/s): vx,vy,vz,wx,wy,wz or @FILE.csv.",
     ),
     "a": click.option(
         "--base-acceleration",
         metavar="VALUES",
-        help="Classical acceleration of the root link in the world's axes, in m/s^2 and rad/s^2:"
+        help="Classical acceleration of the root link in world axes (m/s^2, rad/s^2):"
         " ax,ay,az,alphax,alphay,alphaz or @FILE.csv.",
     ),
 }
@@ -585,7 +597,7 @@ _BASE_MOTION_OPTIONS = {
 def base_motion_options(inputs: str) -> Callable[[_F], _F]:
     """Make the options for the motion of the root link.
 
-    `inputs` contains q for the pose, v for the velocity and a for the acceleration.
+    `inputs` contains the letters of the options: q (pose), v (velocity), a (acceleration).
     """
     return combine(*(_BASE_MOTION_OPTIONS[letter] for letter in inputs))
 

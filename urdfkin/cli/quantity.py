@@ -1,4 +1,4 @@
-"""Define the commands that compute a quantity of a frame, such as `urdfkin jacobian` and `urdfkin placement`.
+"""Define commands that compute a frame's quantity, such as `urdfkin jacobian`.
 
 `make_command` uses the quantities in `verify/quantities.py`.
 """
@@ -153,13 +153,13 @@ def _format_samples(
 
 
 _ROBOT_HELP = (
-    "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may"
-    " also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
+    "ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path may lead to a"
+    " Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
 )
 _breakdown_option = click.option(
     "--breakdown",
     is_flag=True,
-    help="Print the contribution of each joint to the acceleration, split into terms such as Coriolis.",
+    help="Split the acceleration by joint and by term, such as Coriolis.",
 )
 
 
@@ -240,7 +240,7 @@ def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.has_columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.velocity_names]
-        # In a Hessian's CSV, each line has the derivatives of one Jacobian entry.
+        # A CSV line contains the derivatives of one Jacobian entry.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.ndim):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -257,7 +257,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first column of CSV output, for samples without and with times.
+#: Headings of the first CSV column, without and with times.
 _SAMPLE_HEADINGS = ("sample", "t")
 
 
@@ -272,7 +272,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    # A table with columns x, y and z needs three numbers in each row.
+    # A row x, y, z has three numbers.
     # A pose with a quaternion has seven numbers.
     if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
@@ -284,8 +284,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
-    For a Hessian, each row contains the derivative of one Jacobian column by one joint coordinate. Rows with
-    only rounding errors are left out.
+    A Hessian's row is a Jacobian column's derivative by a joint coordinate. Rows with only rounding errors
+    are left out.
     """
     import numpy as np
 
@@ -371,19 +371,18 @@ _POSE_FORMS = {
         "form",
         type=click.Choice(["matrix", *_POSE_FORMS]),
         default="matrix",
-        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
+        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw (URDF's <origin>)."
         " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
     ),
 )
 def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any) -> Answer:
-    """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
+    """Compute a frame's pose (eq. 7.77) in the world or another frame, in metres.
 
-    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position and three
-    angles, or a position and a quaternion. Pinocchio checks that the angles or the quaternion give the same
-    rotation as T.
+    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position with angles or
+    a quaternion. Pinocchio checks that these numbers give the same rotation as T.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may
-    also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
+    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path may lead to a
+    Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
@@ -401,7 +400,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
 
 
 def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> FloatArray:
-    """Convert each pose to a position with three angles (six numbers) or a quaternion (seven numbers)."""
+    """Convert each pose to six numbers (angles) or seven numbers (quaternion)."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
@@ -427,7 +426,7 @@ def _replay_command(x: Inputs, k: int, form: str) -> str:
 
 
 #: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES` in small letters.
-#: The import of that module would slow --help down.
+#: An import of that module would slow `--help` down.
 _EULER_SEQUENCES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = (
     "rpy",
@@ -447,25 +446,24 @@ REPRESENTATIONS = (
         type=click.Choice(REPRESENTATIONS),
         metavar="NAME",
         default="ZYZ",
-        help="Representation of the orientation: rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes"
-        " of three Euler angles. Capital letters are moving axes (ZYZ), small letters are fixed axes (xyz"
-        " is the same as rpy).",
+        help="Representation of the orientation. rpy: roll, pitch, yaw as in a URDF. quaternion: qx, qy, qz,"
+        " qw. ZYZ: Euler angles about moving axes (capital letters). xyz: fixed axes (small letters); the"
+        " same as rpy.",
     ),
     click.option(
         "--nearest",
         type=NumberInRange(min=0.0),
         metavar="RAD",
-        help="The command fails if the distance (rad) of the Euler angles from their singularity is at most"
-        " RAD.",
+        help="The command fails if the Euler angles are at most RAD from their singularity.",
         show_default="1e-9",
     ),
 )
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    Each row contains the derivatives of the position and the orientation (Euler angles or a quaternion) with
-    respect to time. For row i, entry i of v is 1, and all other entries of v are 0. `urdfkin jacobian` prints
-    angular velocities instead.
+    Each row contains the time derivatives of the position and of the orientation numbers. These numbers are
+    Euler angles or a quaternion. Row i belongs to the joint velocity v_i = 1; all other velocities are 0.
+    `urdfkin jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 
@@ -502,16 +500,18 @@ def orientation_labels(representation: str) -> tuple[str, ...]:
     ),
 )
 def imu_command(gravity: str, **_: Any) -> Answer:
-    """Compute the readings of an accelerometer and a gyroscope on a frame, in the frame's own axes.
+    """Compute an accelerometer's and a gyroscope's readings on a frame, in its axes.
 
-    The accelerometer reads the proper acceleration in m/s^2. The proper acceleration is the second time
-    derivative of the frame's position, minus the acceleration of gravity. With the default --gravity, an
-    accelerometer at rest reads 9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
+    The accelerometer reads the proper acceleration in m/s^2. This is the second time derivative of the
+    frame's position, minus gravity's acceleration. With the default --gravity, an accelerometer at rest reads
+    9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
 
     The input is a configuration --q, joint velocities --v and joint accelerations --a. The input may also be
-    a batch of configurations, or a --trajectory. --base-velocity and the other --base options set the motion
-    of the root link. An .npz file may also contain this motion. With --root-joint floating, the pose of the
-    root link is part of --q. See `urdfkin explain gravity-in-an-acceleration`.
+    a batch of configurations, or a --trajectory.
+
+    The --base options, such as --base-velocity, set the motion of the root link. An .npz file may also
+    contain this motion. With --root-joint floating, the pose of the root link is part of --q. See `urdfkin
+    explain gravity-in-an-acceleration`.
     """
     from urdfkin.robot.trajectory import parse_numbers
 
@@ -543,17 +543,16 @@ def imu_command(gravity: str, **_: Any) -> Answer:
 def singular_values_command(rows: str, **_: Any) -> Answer:
     """Compute the singular values, condition number and manipulability of a frame's Jacobian.
 
-    Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
-    rounding errors of the decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of
-    the singular values. The command also computes the manipulability's derivative with respect to each joint,
-    from the frame's Hessian.
+    Each value has a guaranteed lower and upper bound. The bounds include the errors of the Jacobian and the
+    decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular values. The
+    Hessian yields the manipulability's derivatives by the joint coordinates.
 
-    At a singularity, the command prints the rank, the lost directions, and the joints that cause the
-    singularity. The manipulability may have no derivative at a singularity. CSV then contains nan, and JSON
-    contains null. See `urdfkin explain singularity`.
+    At a singularity, the command prints the rank and the lost directions. The command also prints the joints
+    that cause the singularity. The manipulability may have no derivative at a singularity. CSV then contains
+    nan, and JSON contains null. See `urdfkin explain singularity`.
 
-    With --convention, the derivatives are with respect to the joint coordinates of that convention. The
-    singular values are always for joint velocities in rad/s and m/s.
+    With --convention, the derivatives are by the joint coordinates of that convention. The singular values
+    are always for joint velocities in rad/s and m/s.
     """
     from urdfkin.system.documents import as_json_data
 
@@ -617,7 +616,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _values_with_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield each quantity of sample `k`: its name and the list [value, lower bound, upper bound]."""
+    """Yield each quantity of sample `k`: name, [value, lower bound, upper bound]."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     yield "condition", [float(side[k]) for side in found.condition]

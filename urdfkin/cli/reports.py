@@ -14,6 +14,7 @@ from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import report_crash, report_error
 from urdfkin.cli.options import (
     FILE,
+    FILE_OR_FOLDER,
     NumberInRange,
     combine,
     markdown_option,
@@ -35,8 +36,8 @@ report_options = combine(
     click.option(
         "--html",
         type=FILE,
-        help="Write the report to this file as an HTML page that works offline. If the page is long, the"
-        " robots' details are in a folder beside it, such as report-robots.",
+        help="Write the report to this file as an HTML page that works offline. A folder beside a long page"
+        " has the robots' details.",
     ),
     click.option(
         "--junit",
@@ -51,7 +52,10 @@ report_options = combine(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write a report in the requested formats, and return the exit code of the first write error, or 0."""
+    """Write a report in the requested formats.
+
+    Return the exit code of the first write error, or 0.
+    """
     codes = [
         _write(document, name, path) for name in REPORT_FILE_OPTIONS if (path := files[name]) is not None
     ]
@@ -112,21 +116,21 @@ class _ReportGroup(click.Group):
 def report_command() -> None:
     """Show, convert or compare the results of earlier validations.
 
-    RESULTS is the JSON file from `urdfkin validate --json FILE`, or the folder from `--store DIR`. `urdfkin
-    report RESULTS` is short for `urdfkin report show RESULTS`.
+    RESULTS is the FILE of `urdfkin validate --json FILE`, or the DIR of `--store DIR`. `urdfkin report
+    RESULTS` is short for `urdfkin report show RESULTS`.
     """
 
 
 @report_command.command("show", epilog=f"Example: {EXAMPLE}")
-@click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
+@click.argument("results", metavar="RESULTS.json|DIR", type=FILE_OR_FOLDER, required=False)
 @report_options
 @schema_option("urdfkin.validation.document:VALIDATION", "a report")
 @click.pass_context
 def show_report(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
     """Show a report, or convert it to HTML, JUnit or Markdown.
 
-    RESULTS is the JSON file from `urdfkin validate --json FILE`, or the folder from `--store DIR`. The
-    validation may still be running; a validation with missing robots is shown as interrupted.
+    RESULTS is the FILE of `urdfkin validate --json FILE`, or the DIR of `--store DIR`. The validation may
+    still be running. With missing robots, a validation is shown as interrupted.
 
     The command ends with the exit code of the validation. 0: everything verified. 1: a disagreement. 2: a
     robot could not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
@@ -136,8 +140,7 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
 
     if results is None:
         raise click.UsageError(
-            "RESULTS is missing: give the JSON file that `urdfkin validate --json` wrote, or the folder of"
-            " `--store`"
+            "RESULTS is missing: give the FILE of `urdfkin validate --json FILE`, or the DIR of `--store DIR`"
         )
     if any(files.values()):
         reject_unused_options(context, ("cases",), "if the report is written to a file")
@@ -158,8 +161,8 @@ def show_report(context: click.Context, /, results: Path | None, cases: bool, **
     short_help="Compare the reports of two validations.",
     epilog="Example: urdfkin report compare main.json branch.json --markdown comment.md",
 )
-@click.argument("old", metavar="OLD.json", type=click.Path(path_type=Path))
-@click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
+@click.argument("old", metavar="OLD.json", type=FILE_OR_FOLDER)
+@click.argument("new", metavar="NEW.json", type=FILE_OR_FOLDER)
 @click.option(
     "--factor",
     type=NumberInRange(1.0),
@@ -177,7 +180,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     - The run passed before and fails now, or it was interrupted now.
     - A robot is missing, its verdict is worse, or it is new and not verified.
     - More results are outside their bound, or results of a new quantity are.
-    - A quantity or table is no longer compared, or there are fewer samples or results.
+    - A quantity or table is no longer compared, or not with the second oracle.
+    - There are fewer samples or results.
     - A bound is wider for the same joints.
     - The largest disagreement of a quantity grew by more than --factor,
       and is above 2 eps*scale (the error of a single rounding).
@@ -186,10 +190,10 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     - The largest disagreement or ratio became infinite.
 
     If a model changed, the command lists the changes of each joint. A changed model alone is not a
-    regression; `urdfkin same` and `urdfkin diff` compute how far the model's frames move.
+    regression. `urdfkin same` and `urdfkin diff` compute how far the model's frames move.
 
     Exit 0: no regression. 1: a regression. 2: a file cannot be used. For example, the file states more
-    samples for a robot than the validation requested.
+    samples than the validation requested.
     """  # noqa: D301  click needs the character "\b"
     from urdfkin.report.compare import compare, document, markdown_of
     from urdfkin.report.reading import read_document
@@ -212,21 +216,21 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     short_help="Show how the results of each robot changed over several validations.",
     epilog="Example: urdfkin report history nightly --output history.html",
 )
-@click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=FILE_OR_FOLDER)
 @click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
 @schema_option("urdfkin.report.history:HISTORY", "the data")
 @answer_command(*TEXT_FORMATS, "json")
 def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
-    """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
+    """Show how each robot's results changed over several runs of `urdfkin validate`.
 
-    The arguments are reports (JSON files), folders of `urdfkin validate --store`, or folders that contain
-    both. Runs are ordered by their start. The command identifies a robot by its source (a path or a name of
-    the catalogue). If a robot's file was renamed, the command identifies the robot by the robot's name.
-    Changes and regressions are defined as in `urdfkin report compare`. With `--output history.html`, the
-    command writes an HTML page with charts, which works offline.
+    The arguments are reports (JSON files) or folders. A folder is a store (`urdfkin validate --store`), or
+    contains reports and stores. Runs are ordered by their start. A robot is identified by its source (a path
+    or a catalogue name). After the file was renamed, the robot is identified by its name. Changes and
+    regressions are defined as in `urdfkin report compare`. With `--output history.html`, the command writes
+    charts. The HTML page works offline.
 
-    If a file cannot be used, the command prints the file's name and the reason, and shows the other files.
-    Exit 0: every file was used. 2: a file cannot be used.
+    For an unusable file, the command prints the file's name and the reason. The other files are shown. Exit
+    0: every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import as_html, document, read_history
 

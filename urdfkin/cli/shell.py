@@ -1,8 +1,9 @@
 """`urdfkin completion`: complete the words of a command in a shell. `urdfkin warm`: compile all kernels.
 
-Completion runs at each press of the Tab key, so completion imports no large package. A name in a malicious
-file, such as `$(...)`, could make the shell run a command. Completion therefore offers only names without
-characters that a shell interprets.
+Completion must be fast, so this module imports no large package.
+
+A malicious name, such as `$(...)`, could make the shell run a command. Completion therefore offers only names
+without characters that a shell interprets.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Completion offers only these names, because they contain no character that a shell interprets.
-#: The pattern also excludes colons, because Bash separates words at colons.
+#: Names that completion offers.
+#: These names contain no character that a shell interprets.
+#: Bash separates words at colons, so colons are excluded.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a file from which shell completion reads frame names
+#: Maximum size (bytes) of a file for frame names.
 _MAX_BYTES = 10_000_000
-#: XML elements that define frames. In a URDF, only elements directly below <robot> define frames.
+#: XML elements that define frames.
+#: In a URDF, only children of <robot> define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
@@ -42,7 +45,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     # During completion of an option, click has not parsed ROBOT.
-    # Completion therefore uses the first unparsed argument as ROBOT.
+    # ROBOT is then the first unparsed argument.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 
@@ -100,9 +103,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
     """Print the completion script for a shell.
 
     The script completes commands, options and the choices of options. The script also completes robots,
-    files, the frames of the robot on the command line, reference tables, codes of findings and numbers of
-    equations. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To activate the
-    script, add the line for your shell to its startup file:
+    files, reference tables, finding codes and equation numbers. The completed frames are those of the robot
+    on the command line. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To activate
+    the script, add the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"
@@ -122,9 +125,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 def warm_command() -> None:
     """Compile all kernels (machine code) and store them, for container images and CI.
 
-    Without this command, urdfkin computes in plain Python at first. urdfkin compiles a kernel if plain Python
-    takes more than a second, for example for large batches. Each compilation takes some seconds. Kernels are
-    stored below XDG_CACHE_HOME. On another processor, the kernels are compiled again.
+    Without this command, urdfkin computes in plain Python at first. After more than a second in plain Python,
+    urdfkin compiles a kernel. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.
+    On another processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """

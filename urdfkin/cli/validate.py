@@ -1,8 +1,8 @@
-"""`urdfkin validate`: compare every frame and joint with Pinocchio on many samples; study the accuracy."""
+"""`urdfkin validate`: compare all frames and joints with Pinocchio; study the accuracy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +13,7 @@ import click
 from urdfkin.cli.campaign import progress, warn
 from urdfkin.cli.exit import handle_signals
 from urdfkin.cli.options import (
+    FILE_OR_FOLDER,
     WholeNumber,
     load_options,
     load_robot,
@@ -50,11 +51,12 @@ def study_all(
     shard: str | None = None,
     retry: bool = False,
     how: Mapping[str, Any],
+    raise_if_signal: Callable[[], None] = lambda: None,
 ) -> ValidationReport:
-    """Run the accuracy study of each compared robot, and return the report with the results of the study.
+    """Run the accuracy study of each compared robot, and return the extended report.
 
-    `how` are arguments of `load`. With `shard`, for example "1/4", only the robots with their first sample in
-    this part of the validation are studied. An interrupt skips the remaining robots.
+    `how` are arguments of `load`. With `shard`, such as "1/4", only robots with their first sample in this
+    shard are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -66,6 +68,7 @@ def study_all(
     try:
         with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
+                raise_if_signal()
                 if not robot.error_stats or parts[i].start > 0:
                     continue
                 found = None if results is None else results.read(i)
@@ -86,7 +89,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyStore | None]:
-    """Lock the store, or its part `shard`, and yield the accuracy results in the store."""
+    """Lock the store, or its part `shard`, and yield the store's accuracy results."""
     if folder is None:
         yield None
         return
@@ -101,9 +104,9 @@ def _open_results(
 def _study_accuracy(
     source: Robot | str, settings: StudySettings, sha256: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
-    """Return the accuracy result of a robot, and true if the result may be stored.
+    """Return a robot's accuracy result, and whether the result may be stored.
 
-    A failure may be stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
+    A failure may be stored if the exception is an `UrdfkinError`. The robot file must be unchanged.
     """
     import numpy as np
 
@@ -158,7 +161,7 @@ def _list_quantities_in_help(command: _T) -> _T:
 )
 @click.option(
     "--store",
-    type=click.Path(path_type=Path),
+    type=FILE_OR_FOLDER,
     metavar="DIR",
     help="Folder for the results. To resume an interrupted run, repeat the same command.",
 )
@@ -202,23 +205,23 @@ def validate_command(
     cases: bool,
     **options: Any,
 ) -> None:
-    """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
+    """Compare every frame and joint with Pinocchio, in three reference frames.
 
-    Compared: {compared}. Not compared: {not_compared}. By default, urdfkin checks each of these quantities
-    whenever a command computes the quantity.
+    Compared: {compared}. Not compared: {not_compared}. By default, every command checks these quantities when
+    it computes them.
 
-    Configurations are random within the joint limits. The command adds the neutral configuration, and the
-    configurations in which all joints are at their lower or upper limits. In 4 of 25 samples, joint
-    velocities and accelerations are a hundred times larger than in the others.
+    Configurations are random within the joint limits. The command adds the neutral configuration. Two more
+    configurations have all joints at their lower or upper limits. In 4 of 25 samples, velocities and
+    accelerations are a hundred times larger than usual.
 
-    Disagreements are in multiples of eps * scale. The number eps is 2.2e-16. The number scale is the size
-    of the terms that are added to compute a value. Rounding alone causes disagreements of 1 to 10.
+    Disagreements are in multiples of eps * scale. The number eps is 2.2e-16. The number scale is the size of
+    the terms of a value. Rounding alone causes disagreements of 1 to 10.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or a folder. In a folder, the command validates all
-    .urdf files, also in subfolders, but not in hidden folders.
+    .urdf files. Subfolders are included, except hidden folders.
 
-    With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
-    any time.
+    With --store, the same command resumes an interrupted run. `urdfkin report DIR` shows the report at any
+    time.
 
     Exit 0: verified. 1: a disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n:
     stopped by signal n; finished results are saved.
@@ -271,7 +274,10 @@ def validate_command(
         if with_study and not report.interrupted:
             settings = StudySettings(accuracy_samples, options["seed"], accuracy_moving_base)
             retries = retry is not None
-            report = study_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
+            report = study_all(
+                report, given, settings, store=store, shard=shard, retry=retries, how=how,
+                raise_if_signal=stop.raise_if_signal,
+            )  # fmt: skip
     if shard:
         _say_shard(report, shard, store)
         is_empty = not report.robots and not report.interrupted
@@ -298,7 +304,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _list_urdf_files(robot: str) -> list[str]:
-    """Return `robot`; if `robot` is a folder, return the .urdf files in it and its subfolders."""
+    """Return `robot`, or all .urdf files below the folder `robot`."""
     from urdfkin.urdf.lint.settings import DEFAULT_INCLUDE, Settings, find_files
 
     if not robot or robot in catalogue() or not is_folder(Path(robot)):
@@ -307,9 +313,9 @@ def _list_urdf_files(robot: str) -> list[str]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load the robot now if `source` is standard input, which can be read only once.
+    """Load the robot from standard input now, because a second read is impossible.
 
-    The robot has no locked joint, because `validate` and the accuracy study lock the joints.
+    `validate` and the accuracy study lock joints later.
     """
     from urdfkin.robot.loading import load
 
@@ -318,7 +324,7 @@ def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
-    """Load the robot now if `source` is a USD file. As in `_load_stdin`, the robot has no locked joint."""
+    """Load a USD file now, without locked joints, as in `_load_stdin`."""
     from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}

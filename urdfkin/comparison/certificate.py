@@ -1,4 +1,4 @@
-"""Write the result of `urdfkin same` as a certificate, and check a certificate against two models."""
+"""Write the result of `urdfkin same` as a certificate, and check a certificate."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ from urdfkin.verify.oracles import PINOCCHIO, package_versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative tolerance of the numbers in a certificate, and absolute tolerance (m or rad) near zero.
-#: The tolerances allow for different rounding errors on the machine that wrote the certificate.
+#: Relative and absolute (m or rad) tolerance of certified numbers.
+#: Two machines can make different rounding errors.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
-#: The relative tolerance of a bound is this number times the machine epsilon.
+#: Relative tolerance of a bound / machine epsilon.
 _BOUND_TOLERANCE = 64.0
-#: `recheck` computes these entries again, and compares the results with the certificate.
+#: Entries that `recheck` computes again.
 RECOMPUTED_ENTRIES = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -103,8 +103,8 @@ class CertifiedConversion(TypedDict):
     back: Annotated[
         bool,
         doc(
-            "Whether the formula is `T_B = M T_A^-1 N`. The inverse is necessary if the joint's parent link"
-            " in A matches the joint's child link in B."
+            "Whether the formula is `T_B = M T_A^-1 N`. This is so if the joint's parent link in A matches"
+            " its child link in B."
         ),
     ]
 
@@ -118,7 +118,7 @@ class CertifiedJoint(TypedDict):
     offset: Annotated[float, doc("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
-        doc("Conversion of a planar or floating joint's pose from A to B; null if no conversion is needed."),
+        doc("Conversion of a planar or floating joint's pose from A to B; null without a conversion."),
     ]
 
 
@@ -133,7 +133,7 @@ class ToolEntry(TypedDict):
 class Rounding(TypedDict):
     """Largest distance and angle that `same` treats as rounding errors.
 
-    `metres` assumes that planar, floating and unlimited prismatic joints travel at most 10 m.
+    Planar, floating and unlimited prismatic joints are assumed to travel at most 10 m.
     """
 
     metres: NonNegativeFloat
@@ -148,8 +148,8 @@ class FrameEntry(TypedDict):
     lower: Annotated[
         NonNegativeFloat,
         doc(
-            "Lower bound of the largest distance, metres: the computed distance at `q_a` and `q_b`, minus the"
-            " largest rounding error."
+            "Lower bound of the largest distance, metres. It equals the computed distance at `q_a` and `q_b`,"
+            " minus the largest rounding error."
         ),
     ]
     upper: Annotated[
@@ -195,8 +195,8 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. The list ends with the joints of only one"
-            " model, and the links after different moving joints in A and B."
+            "Differences, in order from the base to the tips. The last entries are joints of only one model,"
+            " and links after different moving joints."
         ),
     ]
     remarks: Annotated[
@@ -209,7 +209,7 @@ class SameCertificate(Header):
         list[ToolEntry],
         doc(
             "Pairs of matched links that `same` treats as different tool frames. The pose between two tool"
-            " frames is a change of B, and not a difference between the models."
+            " frames is a change of B, not a difference."
         ),
     ]
     orders: Annotated[
@@ -222,13 +222,13 @@ class SameCertificate(Header):
     rounding: Rounding
     frames: Annotated[
         list[FrameEntry],
-        doc("For each pair of matched links: an interval of their largest distance after the changes of B."),
+        doc("For each pair of matched links: interval of the largest distance after the changes of B."),
     ]
     as_written: Annotated[
         FrameEntry | None,
         doc(
-            "The frame with the largest distance between the unchanged models, and an interval of this"
-            " distance. The entry is null if B needs no changes. It is also null without common frames."
+            "The frame with the largest distance between the unchanged models, and its interval. The entry is"
+            " null if B needs no changes. It is also null without common frames."
         ),
     ]
     checked: Confirmed
@@ -259,7 +259,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", as_json_data(document))
 
 
-#: The certificate copies these attributes of `Sameness`, under the same names.
+#: `Sameness` attributes that the certificate copies.
 _COPIED_ATTRIBUTES = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",
@@ -278,15 +278,15 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    `recheck` matches the joints as in the certificate. For the verdict "differs", `recheck` makes a second
-    comparison with the joint matching of `same`, without the argument `map`. The second verdict must also be
-    "differs".
+    The joints are matched as in the certificate. If the verdict is "differs", `recheck` compares the models
+    again. The second comparison matches the joints like `same` without the argument `map`. The second verdict
+    must also be "differs".
 
     Returns:
         A line for each statement that is wrong or not proven.
 
     Raises:
-        InputError: the certificate was made for other models, or names an unknown joint or link.
+        InputError: the certificate belongs to other models, or names an unknown joint or link.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -444,7 +444,10 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Return whether two entries are equal up to rounding; `zero` is the absolute tolerance."""
+    """Return whether two entries are equal up to rounding.
+
+    `zero` is the absolute tolerance.
+    """
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -494,7 +497,10 @@ def _interval_errors(
     *,
     use_branch_and_bound: bool,
 ) -> Iterator[str]:
-    """Yield an error for each wrong or unproven bound; `rounding` contains rounding errors (m, rad)."""
+    """Yield an error for each wrong or unproven bound.
+
+    `rounding` contains rounding errors (m, rad).
+    """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)

@@ -1,4 +1,7 @@
-"""Decide whether two models are the same robot, and whether single precision causes their differences."""
+"""Decide whether two models are the same robot.
+
+If the models differ, decide whether single precision explains the differences.
+"""
 
 from __future__ import annotations
 
@@ -61,14 +64,15 @@ from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
-#: Number of random configurations at which Pinocchio checks the distances between matching frames.
+#: Number of random configurations that Pinocchio checks.
 CONFIRMATION_SAMPLES = 8
-#: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
-#: The search for the largest distance between the unchanged models uses at most this number of frames.
+#: Maximum number of frames with a bound on `FINE_GRID`.
+#: Also the maximum number of frames in `_farthest_as_written`.
 MAX_REFINED_FRAMES = 4
-#: Maximum length (m) of a path from the root to a link; squares of lengths above 1.3e154 m overflow.
+#: Maximum length of a path from root to link, m.
+#: Squares of lengths above 1.3e154 overflow.
 MAX_PATH_METRES = 1e150
-#: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
+#: Stop at: bound <= SHARP_FACTOR * largest distance found.
 SHARP_FACTOR = 1.05
 
 
@@ -94,24 +98,24 @@ def same(
     Args:
         a: A robot, or a source for `load`.
         b: The other robot, or a source for `load`.
-        map: Joint names of `a`, each with the name of the matching joint in `b`. Only joints that urdfkin
-            cannot match by names and axes need an entry.
+        map: {joint name of `a`: name of the matching joint of `b`}. Only joints that urdfkin cannot match by
+            names and axes need an entry.
         bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
             most of the time.
         boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
             bounds if the models differ in many places. The value 0 turns off branch and bound.
         within: Limit (m and rad) for `Sameness.within`. If `Sameness.after` is not empty, branch and bound
-            tries to prove this limit for the distances of all matching frames.
+            tries to prove this limit.
 
     Returns:
-        The verdict, the matched joints and links, the differences, and an interval for every pair of matched
-        links. The interval contains the largest distance of the two links within the joint limits.
+        The verdict, the matched joints and links, and the differences. Each pair of matched links has an
+        interval. The interval contains the largest distance of these links within the joint limits.
 
     Raises:
         UrdfError: a model has errors.
         SourceError, UnknownNameError, InputError: as for `load`.
         UnknownNameError: `map` names a joint that the model does not have.
-        InputError: joints in `map` cannot be matched, another argument is wrong, or a path is longer than
+        InputError: joints in `map` cannot be matched, or an argument is wrong. Also if a path is longer than
             1e150 m.
         UrdfkinError: Pinocchio finds a distance above a proven bound.
 
@@ -131,7 +135,7 @@ def same(
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         check_joint_names(robot.tree, list(names), which)
-    # The comparison stores compiled trees in the robots, so `same` passes copies of the user's robots.
+    # Compiled trees are stored in copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -309,7 +313,7 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Return bounds (m, rad) on the frame displacements by single precision and rounding."""
+        """Bound the frame displacements (m, rad) that single precision and rounding cause."""
         if all(robot.single is None for robot in self.robots):
             return None
         pairs = [(frame.a, frame.b) for frame in alignment.frames]
@@ -345,7 +349,10 @@ class Comparator:
         )
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Align the unchanged models with the joint pairs, joint orders and links of `alignment`."""
+        """Align the unchanged models.
+
+        The joint pairs, joint orders and links are those of `alignment`.
+        """
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -355,8 +362,8 @@ class Comparator:
     def _comparable_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
-        # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
-        # Therefore, a comparison with a table uses only links with equal names in A and B.
+        # A table's frame poses depend on the Denavit-Hartenberg convention.
+        # So a table is compared by links of equal names.
         return [(a, b) for a, b in pairs if not alignment.has_free_frames or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -376,7 +383,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the displacement (m) and the rotation (rad) of frames that rounding can cause.
+        """Bound the frame displacement (m) and rotation (rad) that rounding causes.
 
         `same` ignores a small difference at each joint:
 
@@ -459,9 +466,9 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Sharpen the bounds above `target` (m) by branch and bound, the largest bound first.
+        """Sharpen the bounds above `target` (m) by branch and bound.
 
-        The method stops at the first bound that stays above `target`.
+        The largest bound is sharpened first. The method stops at a bound that stays above `target`.
         """
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
@@ -479,7 +486,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_REFINED_FRAMES]]
-        # If all distances are within rounding, the frame with the largest bound on the angle is used.
+        # Without distances above rounding, the angle bound selects the frame.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -499,7 +506,7 @@ class Comparator:
     ) -> Interval:
         """Return a frame's interval.
 
-        `attained` contains the largest distance found (m), and the variables' values there.
+        `attained` contains the largest distance found (m), and the variables at this distance.
         """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
@@ -517,7 +524,10 @@ class Comparator:
     def _confirm(
         self, alignment: Alignment, variables: Variables, bounds: Sequence[float] | float | None
     ) -> Confirmation:
-        """Check bounds (m) on the distances with Pinocchio: one for each frame, or one for all frames."""
+        """Check bounds (m) on frame distances against Pinocchio's distances.
+
+        `bounds` has one number for each frame, or one for all frames.
+        """
         if bounds is None:
             return Confirmation("not asked", reason="bounds=False, so there is no bound to check")
         if not all(as_verify(robot.verifier.policy) for robot in self.robots):
@@ -567,7 +577,10 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each joint pair that can translate, with its travel (m); infinite without limits."""
+    """Yield each joint pair that can translate, and the travel (m).
+
+    The travel is infinite without limits.
+    """
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
             yield step, math.inf
@@ -596,7 +609,10 @@ def _fix_idle_mimic_joints(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
-    """Fix mimic joints with multiplier 0 at their offsets, unless the matching joint moves."""
+    """Fix mimic joints of multiplier 0, unless the matching joint moves.
+
+    The fixed joint value is the offset of the mimic rule.
+    """
     moves = tuple(
         [joint.kind.nv > 0 and not _is_idle_mimic_joint(joint) for joint in one.joints]
         for one in (tree, other_tree)
@@ -615,10 +631,12 @@ def _joints_with_moving_match(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return the indices of the joints of the first tree that match a moving joint of the second tree.
+    """Return joint indices of the first tree.
 
-    Joints match by their names or by their child links. Moving joints with equal names do not match other
-    joints by their child links.
+    Each of these joints matches a moving joint of the second tree.
+
+    Joints match by their names or by their child links. Moving joints with equal names match each other, and
+    no other joint.
     """
     own, other = ([joint.name for joint in tree.joints] for tree in trees)
     own = [names.get(name, name) for name in own]
@@ -633,9 +651,9 @@ def _joints_with_moving_match(
     as_many = len(moving[0] - moving[1]) >= len(moving[1] - moving[0])
 
     def follows_match(i: int, match: int) -> bool:
-        """Return whether an earlier moving joint of the first tree can match the joint `match`.
+        """Return whether a moving joint before joint `i` can match the joint `match`.
 
-        The joint `i` is then an additional joint between the moving joint and the link.
+        Joint `i` is then an additional joint after this moving joint.
         """
         link = trees[0].joints[i].parent
         while True:
@@ -663,10 +681,12 @@ def _is_idle_mimic_joint(joint: Joint) -> bool:
 def _match_usd_spellings(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Match the names of a USD model and of another model, because USD changes the spelling of names.
+    """Match the names of a USD model and of another model.
+
+    USD changes the spelling of names.
 
     Returns:
-        The link names of A and B in the original spelling, and a dict from joint names of A to those of B.
+        The original link names of A and B. A dict from joint names of A to joint names of B.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -682,7 +702,7 @@ def _match_usd_spellings(
 
 
 def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
-    """Map USD spellings to original names, without ambiguous spellings."""
+    """Map unambiguous USD spellings to original names."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -705,10 +725,10 @@ class JointComparison:
     """Prove joint by joint that single precision causes every difference.
 
     The rounding errors of all joints add up in a frame's pose. A comparison of frame poses can therefore miss
-    a small wrong number. `JointComparison` allows each joint only the rounding errors of its own numbers.
+    a small wrong number. `JointComparison` allows each joint only its own rounding errors.
 
-    **Compared quantities.** Two files can describe the same joint by different frames, and can have different
-    fixed links. The compared quantities do not depend on these choices:
+    **Compared quantities.** Two files can describe the same joint by different frames. The files can also
+    have different fixed links. The compared quantities depend on neither:
 
         common link  a link of A with a matching link of B
         P            nearest ancestor of a common link in A that is also a common link
@@ -770,11 +790,11 @@ class JointComparison:
     - A planar or floating joint is attached to the root body, and is the only joint from P to the link.
     - The frames of a planar or floating joint agree in A and B up to double precision.
 
-    If a link violates one of these conditions, `same` reports the link as not explained.
+    A link that violates a condition is reported as not explained.
 
     Args:
-        errors: Two (joints, 3) arrays, for A and for B. The columns are error bounds of position (m),
-            rotation (rad) and mimic rule (relative). The bounds are 0 for double precision.
+        errors: Two (joints, 3) arrays, for A and for B. The columns are error bounds: position (m), rotation
+            (rad), mimic rule (relative). The bounds are 0 for double precision.
         base: (4, 4) pose of B's root in A's root frame.
     """
 
@@ -791,7 +811,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in alignment.frames}
         self.steps = {step.a: step for step in alignment.steps}
         root_of_b = next((a for a, b in self.pairs.items() if b == 0), 0)
-        #: Links of A and B at which the compared paths begin.
+        #: First links of the compared paths in A and B.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (root_of_b, 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -815,7 +835,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def places_in_second_model(self) -> dict[str, str]:
-        """Map each matched link and joint of the first model, for example "joint j", to its match.
+        """Map each matched link and joint of the first model to its match.
+
+        A key is, for example, "joint j".
 
         Fixed joints match if their child links match.
         """
@@ -829,7 +851,10 @@ class JointComparison:
         return places
 
     def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
-        """Return P and the joints from P to a link; without a common ancestor link, P is `start[0]`."""
+        """Return P and the joints from P to a link.
+
+        Without a common ancestor link, P is `start[0]`.
+        """
         joints, path = self.trees[0].joints, list[int]()
         while link:
             path.insert(0, link - 1)
@@ -839,7 +864,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints from the last common ancestor to `start`, and those to `end`."""
+        """Return two paths from the last common ancestor: to `start`, and to `end`."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -881,7 +906,8 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A wrong link origin also shifts the joint axis in the frame of P, but not in the link's frame.
+            # A wrong link origin shifts the axis relative to P.
+            # Relative to the link, the axis does not shift.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(
@@ -892,7 +918,10 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis_a: Screw, axis_b: Screw) -> tuple[float, float]:
-        """Return the angle (rad) between two axes, and the distance (m) of one origin from the other axis."""
+        """Return the angle (rad) and the distance (m) between two axes.
+
+        The distance is from the origin of one axis to the other axis.
+        """
         ends = (axis_a, axis_b) if self.errors[0].any() else (axis_b, axis_a)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
@@ -907,8 +936,8 @@ class JointComparison:
             path: Joints from C to the link.
 
         Returns:
-            The screw and the error bounds (m, rad) of each joint of `path`; the link pose; and the error
-            bounds (m, rad) of this pose.
+            For each joint of `path`: the screw and its error bounds (m, rad). The link pose. The error bounds
+            (m, rad) of the link pose.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

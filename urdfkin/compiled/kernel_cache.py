@@ -1,4 +1,4 @@
-"""Find the cache folder of compiled kernels, and report when a compilation begins and ends.
+"""Find the cache folder of compiled kernels, and report compilations.
 
 This module does not import Numba.
 """
@@ -19,13 +19,14 @@ from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
 #: Lock for the import of Numba and for compilations.
-#: A fork waits for this lock, because a child cannot finish the parent's compilation.
-#: The import of Numba acquires this lock before `logging`'s lock. A fork acquires the newest lock first.
-#: For the same order, this lock must be newer, so `logging` is imported before the lock is created.
+#: A fork waits: a child cannot finish the parent's compilation.
+#: Import of Numba: this lock first, then `logging`'s lock.
+#: A fork acquires the newest lock first.
+#: So `logging` must be imported before this lock is created.
 compile_lock = make_fork_safe_lock()
 
-#: A function that receives a kernel's name and compile time (s).
-#: When the compilation begins, the second argument is None.
+#: (kernel name, None): a compilation begins.
+#: (kernel name, seconds): the compilation has ended.
 Listener = Callable[[str, float | None], None]
 
 

@@ -1,4 +1,6 @@
-"""The forward recursion of section 7.7 for a block of configurations: link by link, from the base outwards.
+"""The forward recursion of section 7.7 for a block of configurations.
+
+The recursion goes link by link, from the base outwards.
 
 The state of a link consists of:
 
@@ -8,8 +10,8 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-The textbook uses world axes. The rotation R of a link converts components in the link's axes to components in
-world axes. The joint axis and the interorigin vector have constant components in the link's axes.
+The textbook uses world axes. The rotation R converts components in link axes to components in world axes. The
+joint axis and the interorigin vector have constant components in the link's axes.
 
 | `axes` | joint axis and interorigin vector | velocities and accelerations of the previous link |
 |---|---|---|
@@ -19,9 +21,9 @@ world axes. The joint axis and the interorigin vector have constant components i
 For velocities and accelerations, the recursion uses the axes of the requested reference frame. A rotation of
 the final result would add rounding errors. For Jacobians, the recursion uses world axes.
 
-The placeholder `unused()` replaces each vector that a result does not need. Kernels contain no code for
-operations with the placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions with
-the number types of `urdfkin.compiled.machine.numbers`.
+The placeholder `unused()` replaces each unneeded vector. Kernels contain no code for operations with the
+placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions. The number types of the
+copies are in `urdfkin.compiled.machine.numbers`.
 """
 
 from __future__ import annotations
@@ -58,7 +60,7 @@ from urdfkin.compiled.python_numbers import (
 )
 from urdfkin.kinematics import equations as eq
 
-# Compiled code takes plain integers, not Python's enumerations.
+# Compiled code needs plain integers, not enumerations.
 _PROGRAM, _CONSTANTS, _SCRATCH, _OUT = map(
     int, (KernelArgs.PROGRAM, KernelArgs.CONSTANTS, KernelArgs.SCRATCH, KernelArgs.OUT)
 )
@@ -146,7 +148,10 @@ def rotate_frame(axes, state, S):
 
 
 def _rotate_about_z(axes, state, scratch, row):
-    """Rotate about z (7.5). Scratch row `row` contains the sine, and the next row the cosine."""
+    """Rotate about z (7.5).
+
+    Scratch row `row` contains the sine. The next row contains the cosine.
+    """
     return rotate_frame(
         axes, state, eq.about_z(load_number(scratch, row), load_number(scratch, row + 1), zero(), one())
     )
@@ -168,9 +173,9 @@ def after_prismatic(axes, state, slide, v, a):
 
 
 def add_free_motion(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity and acceleration of a planar or floating joint, in the child link's axes.
+    """Add the velocity and acceleration of a planar or floating joint.
 
-    The state must already contain the joint's displacement.
+    The vectors are in the child link's axes. The state must already contain the joint's displacement.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = (
@@ -190,7 +195,7 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
 
 
 def _joint_coordinate(scratch, row, constants, rule, is_mimic):
-    """Round the product and the sum of a mimic rule separately, as Pinocchio does."""
+    """Round the product and the sum of a mimic rule separately, like Pinocchio."""
     x = load_number(scratch, row)
     if is_mimic:
         x = round_product(load_constant(constants, rule) * x) + load_constant(constants, rule + 1)
@@ -314,9 +319,10 @@ def _restore_state(scratch, row, state):
 
 
 def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row):
-    """Read whole blocks of eight numbers, which is faster.
+    """Read whole blocks of eight numbers.
 
-    Surplus numbers go to the scratch rows of the next input. If that input is needed, it is read later.
+    Whole blocks are faster. Surplus numbers go to the scratch rows of the next input. The next input, if
+    needed, is read later.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -349,7 +355,10 @@ def _base_state(axes, m, scratch, args, row, start):
 
 
 def _sines_and_cosines(scratch, program, constants):
-    """Compute all sines and cosines first, because the recursion needs all registers."""
+    """Compute all sines and cosines.
+
+    The sines come first, because the recursion needs all registers.
+    """
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _joint_coordinate(scratch, program[i], constants, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(scratch, ANGLE_ROW, angle)
@@ -471,7 +480,7 @@ def _compute_block(
     at, buffer = program[_CODE], args[_BUFFER]
     to, first = (doubles_at(buffer), 0) if buffer else (doubles_at(args[_OUT]), start)
     if args[_BASE] == 0 and _TRANSLATE_X <= program[at] <= _TRANSLATE:
-        # The base is at rest, so a translation from the base changes only the position.
+        # Base at rest: a translation changes only the position.
         state = _shift_position(state, _constant_vector(constants, program[at + 4]))
         at += INSTRUCTION_WIDTH
     while program[at] != _END:
@@ -501,8 +510,8 @@ def _compute_block(
 def forward_recursion(address, axes, orders, state_for_output, store_axis, write_column, write_frame):
     """Execute a program for every block of configurations.
 
-    `orders` is 1 for q, 2 for q and v, 3 for q, v and a.
-    Return 1 for nan, inf or too large inputs, else 0.
+    `orders` is the number of inputs: 1 (q), 2 (q, v) or 3 (q, v, a). Return 1 for nan, inf or too large
+    inputs, else 0.
     """
     args = integers_at(address)
     program, constants, scratch = (

@@ -1,20 +1,20 @@
 """Compute the transform between two consecutive joint axes.
 
-The z axis of each joint frame is the joint's axis. Let A be the constant pose of the next joint's frame in
-this joint's frame. `find_axis_transform` writes A as a product:
+The z axis of each joint frame is the joint's axis. A is the constant pose of the second frame in the first
+frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-Rz(phi) Tz(delta) commutes with the motion of the first joint, so phi and delta are parts of theta and d in
-the first joint's row. Likewise, phi_next and delta_next are parts of theta and d in the second joint's row.
-For skew axes that are not nearly parallel, beta is 0, and the x axis has two possible directions. For each
-direction of x, the six numbers other than beta are unique (Denavit and Hartenberg). docs/dh.md explains the
-numbers for parallel and for nearly parallel axes.
+Rz(phi) Tz(delta) commutes with the motion of the first joint. The first joint's row therefore contains phi in
+theta, and delta in d. The second joint's row contains phi_next in theta, and delta_next in d.
 
-For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the pose
-determines only the sum of the angles theta. `match_axis_transforms` copies these cells from a reference
-table, except one cell that is computed from the sum. In a Hayati row, any d is possible, because the axes do
-not determine d.
+If skew axes are not nearly parallel, beta is 0. The x axis then has two possible directions. For each
+direction, the six other numbers are unique (Denavit and Hartenberg). The page docs/dh.md explains parallel
+and nearly parallel axes.
+
+Parallel axes determine only the sum of their offsets d. Coinciding axes determine only the sum of their
+angles theta. `match_axis_transforms` copies these cells from a reference table. One of these cells is
+computed from the sum instead. In a Hayati row, the axes do not determine d.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from urdfkin.kinematics.roundings import (
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) count as nearly parallel.
-#: At this tilt, an error of 1 mm in the URDF can move the common normal by 100 mm.
+#: Axes with a smaller tilt (rad) count as nearly parallel.
+#: A tilt of 1e-2 amplifies length errors by 100.
 NEARLY_PARALLEL = 1e-2
 
-#: Two axes get a Hayati row only if the sine of their tilt is below this number.
+#: Largest sine of the tilt for a Hayati row.
 MAX_HAYATI_TILT_SINE = 0.35
 
 
@@ -137,7 +137,7 @@ def find_hayati_transform(
 ) -> AxisTransform:
     """Return a Hayati row's transform.
 
-    The x axis points to the intersection of the next axis with the xy plane.
+    The x axis points to the next axis's intersection with the xy plane.
     """
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
@@ -176,9 +176,10 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """A pair of consecutive joint axes, and the reference table's row of the first joint.
+    """Two consecutive joint axes, and the reference row of the first joint.
 
-    The argument `delta_in` of a method is the offset (m) from the first joint's DH frame to its joint frame.
+    The argument `delta_in` is an offset (m) along the first joint's axis. The offset leads from the joint's
+    DH frame to the joint frame.
     """
 
     A: FloatArray
@@ -193,7 +194,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether the axes do not determine d, because they are parallel or the row is a Hayati row."""
+        """Whether d is free: for parallel axes and for Hayati rows."""
         return tilt_sine(self.A) <= self.noise.radians or self._needs_hayati_row
 
     @property
@@ -210,9 +211,9 @@ class PairWithReference:
 
     @property
     def hayati_offset(self) -> float | None:
-        """Value of z (m) in this joint's frame where a Hayati row's x axis intersects the joint's axis.
+        """Height z (m) of a Hayati row's x axis in this joint's frame.
 
-        With this value, the cell a equals the reference.
+        With this height, the cell a equals the reference.
 
             p: origin of the next joint's frame
             t: unit vector along the projection of the next axis onto the xy plane
@@ -235,7 +236,7 @@ class PairWithReference:
         return offset if abs(offset) <= self.reach else None
 
     def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
-        """Return the transform; the offset `d` (m) is ignored if the axes determine the offset."""
+        """Return the transform. The offset `d` (m) is ignored if the axes determine d."""
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
             return find_axis_transform(A, self.reach, default_phi, hayati=False, noise=self.noise)
@@ -258,11 +259,14 @@ def match_axis_transforms(
     *,
     keeps_first_d: bool = True,
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Match the reference's cells; return the transform and the first joint's theta of each pair.
+    """Match the reference's cells.
 
-    Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint. `tip_offset` is the required `delta_in` of
-    the last joint, or None if any `delta_in` is allowed. Without `keeps_first_d`, a zero d of the reference's
-    first row is not copied.
+    The first joint has the pose Rz(phi_in) Tz(delta_in) in frame 0. `tip_offset` is the required `delta_in`
+    of the last joint. None: any `delta_in` is allowed. If `keeps_first_d` is false, the reference's zero d_1
+    is not copied.
+
+    Returns:
+        The transforms of the pairs, and theta of each pair's first joint.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -303,9 +307,9 @@ def _choose_d(
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # Therefore, d can be chosen so that the cell a of one Hayati row equals the reference.
-        # This row is the row with the most tilted axes.
+        # A later prismatic joint or the tool compensates for d.
+        # Match the cell a of one Hayati row.
+        # Choose the row with the most tilted axes.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -323,9 +327,9 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    A revolute joint or the base can compensate for a different theta, but a prismatic joint cannot. If
-    prismatic joints i + 1 to k follow, and only row k determines phi, theta of rows i + 1 to k therefore
-    equals the reference instead.
+    A revolute joint or the base can compensate for another theta. A prismatic joint cannot. If prismatic
+    joints i + 1 to k follow, row k alone may determine phi. In this case, theta of rows i + 1 to k equals the
+    reference.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
@@ -402,8 +406,8 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     The bound covers angles rounded to fifteen digits.
 
     Args:
-        joints: Number of joint origin transforms in the product that is the pose.
-        length: Sum of the lengths of the origins' translations, m.
+        joints: Number of joint origins between the two frames.
+        length: Sum of the origins' lengths, m.
         reach: Length of the whole path, m.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
@@ -424,7 +428,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def sum_zeroed_tilts(chain: FrameChain) -> float:
-    """Bound the orientation error (rad) of a table in which the tilts within rounding are zero."""
+    """Bound the orientation error (rad) due to zeroed tilts. Tilts within rounding are zeroed."""
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_sine(A), abs(float(A[2, 0]))) if tilt <= noise.radians)

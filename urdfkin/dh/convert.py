@@ -1,4 +1,4 @@
-"""Convert a table to the other convention, to a kinematic tree, or to a URDF.
+"""Convert a table to the other convention, a kinematic tree or a URDF.
 
 `urdfkin.dh.table` defines the conventions and the factors X.
 
@@ -7,10 +7,10 @@
 | modified | new tool = X_n . tool | a base Tx(a) Rx(alpha) becomes a and alpha of the first row |
 | standard | new base = base . X_1 | a tool Tx(a) Rx(alpha) becomes a and alpha of the last row |
 
-If base or tool becomes part of a row, the new base or tool is the identity.
+A base (tool) that becomes part of a row is replaced by the identity.
 
-In a tree, the frame of joint i is the Denavit-Hartenberg frame with the joint's axis as its z axis: frame
-i - 1 of a standard table, or frame i of a modified table.
+In a tree, joint i has frame i - 1 of a standard table. For a modified table, joint i has frame i. The z axis
+of this frame is the joint's axis.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=target, rows=rows, base=base, tool=tool)
 
 
-#: Limits for a prismatic joint without limits (m, m/s and N).
+#: Limits (m, m/s, N) for a prismatic joint without limits.
 #: URDF requires limits for prismatic joints.
 DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
@@ -90,7 +90,7 @@ def to_urdf(table: DHTable) -> str:
 
 
 def to_free_tree(table: DHTable) -> KinematicTree:
-    """Return a tree without joint limits and mimic rules, with one coordinate per row."""
+    """Return a tree without joint limits and mimic rules. Each row has one coordinate."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return make_serial_tree(table.robot, link_names(table), joints)
@@ -99,7 +99,7 @@ def to_free_tree(table: DHTable) -> KinematicTree:
 def make_serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) -> KinematicTree:
     """Connect links i and i + 1 by joint i.
 
-    A mimicked joint that is not among the joints becomes a joint on the base. The tip is the last link.
+    A mimicked joint outside `joints` becomes a joint on the base. The tip is the last link.
     """
     triples, names = list[tuple[Joint, str, str]](), {joint.name for joint in joints}
     for joint in joints:
@@ -128,7 +128,7 @@ def _serial_joints(
 
 
 def relative_frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return the pose of each frame, and of the tip, in the previous frame, with all joints at zero."""
+    """Return the poses of all frames and the tip in the previous frame. All joints are at zero."""
     if not table.rows:
         return [table.base @ table.tool]
     if table.convention is DHConvention.STANDARD:
@@ -143,7 +143,7 @@ def link_names(table: DHTable) -> list[str]:
 
 
 def make_link_names(base: str, joints: Sequence[str], tip: str) -> list[str]:
-    """Return different names of the links of a serial chain."""
+    """Return different link names of a serial chain."""
     names = [base]
     for joint in joints:
         names.append(make_unique(f"{joint}_link", [*names, tip]))
@@ -161,7 +161,7 @@ def _tree_kind(row: DHRow) -> JointKind:
 
 
 def _tree_limit(row: DHRow) -> Limit | None:
-    """Return the row's limit; a prismatic joint without position limits gets the default ones.
+    """Return the row's limit. A prismatic joint without position limits gets default limits.
 
     The URDF writer rejects a joint with only one position limit.
     """

@@ -1,9 +1,10 @@
-"""Read tables from TOML files, JSON files, and plain text copied from a document or web page.
+"""Read tables from TOML, JSON and plain text.
 
-`urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings with a,
-alpha, d and theta in any order. Below the headings, the table has a line for each joint. Commas, semicolons,
-tabs, bars, ampersands or blanks separate the cells. The lines before and after the table may state the
-convention, names, base and tool, as in the tables that urdfkin prints.
+`urdfkin.dh.rows` defines the content of TOML and JSON files. Plain text may be copied from a document or a
+web page. A table in text begins with a line of headings. The headings are a, alpha, d and theta in any order.
+Each line below the headings contains a joint's cells. Commas, semicolons, tabs, bars, ampersands or blanks
+separate the cells. Other lines may state the convention, names, base and tool. Printed tables of urdfkin
+contain such lines.
 """
 
 from __future__ import annotations
@@ -35,9 +36,10 @@ from urdfkin.system.resources import robots_dir
 
 #: Tolerance of a rotation that is printed with six digits.
 _PRINTED_ROTATION_TOLERANCE = 1e-5
-#: Blank lines and Markdown fences may separate the heading and the three rows of a printed pose.
+#: Maximum number of lines below a printed pose's heading.
+#: Blank lines and Markdown fences may separate the three rows.
 _MAX_POSE_LINES = 6
-#: A line such as `convention: modified`, with or without a comment mark.
+#: A line such as `convention: modified` or `# convention: modified`.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
 #: A line `# key: value` in CSV, with any key.
 #: `table_from_mapping` rejects unknown keys.
@@ -54,13 +56,16 @@ _NAMES = {
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
     **dict.fromkeys(("variable", "joint variable"), "variable"),
 }
+#: A heading with a unit in brackets, such as `velocity [deg/s]`.
+_LIMIT_HEADING = re.compile(rf"({'|'.join(LIMIT_KEYS)})\s*[\[(]\s*([^\])]+?)\s*[\])]$", re.IGNORECASE)
+_EFFORT_UNITS = ("N", "Nm", "N m", "N*m", "N·m")
 _KINDS_BY_SIGMA = {"0": "R", "1": "P"}
 _ROW_NUMBERS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
 _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
     "standard": r"\b(?:standard|classic(?:al)?|distal|paul(?:'s)?)\b",
 }
-#: The names and the convention in the title of a table that urdfkin prints.
+#: Names and convention in the title of a printed table.
 _TITLE = re.compile(
     r"^(?:.*\bparameters of )?(?:\*\*)?(?P<robot>.+?)(?:\*\*)?[:,] (?P<base>.+?) to (?P<tip>.+?),"
     r" (?P<convention>standard|modified) "
@@ -80,7 +85,7 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             break
     else:
         raise _missing_header_error(lines)
-    # The title of a robot with the name "robot" begins with "robot:", as the setting "robot: ur5" does.
+    # A title such as "robot: ..." looks like a setting.
     # Therefore, titles are removed before the settings are read.
     without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
     data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
@@ -92,7 +97,7 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             data = names | data
     for end in ("base", "tool"):
         if end not in data and (pose := _parse_pose(end, grid.other_lines)):
-            # The printed pose is in metres, also if the table is in millimetres.
+            # A printed pose is always in metres.
             in_millimetres = parse_units(lengths=data.get("lengths", "metres")).uses_millimetres
             data[end] = [[*row[:3], row[3] * 1e3 if in_millimetres else row[3]] for row in pose]
     data["rows"] = [_parse_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
@@ -125,7 +130,7 @@ class _Grid:
 
     @property
     def has_clear_decimal_comma(self) -> bool:
-        """Whether a number contains a comma that must be a decimal comma, such as 0,4 or 162,5."""
+        """Whether a number has an unambiguous decimal comma, such as 0,4 or 162,5."""
         return any(
             column.name in _NUMBER_COLUMNS and _COMMA.search(_THOUSANDS.sub("", cell))
             for row in self.rows
@@ -188,8 +193,7 @@ def _missing_header_error(lines: list[str]) -> InputError:
             "the line of column headings uses a different separator from the other lines",
             where="header",
             found=", ".join(best)[:200],
-            remedy="separate the cells of all lines by the same character: a comma, a semicolon, a tab"
-            " or a bar",
+            remedy="separate all cells by the same character: a comma, a semicolon, a tab or a bar",
         )
     return InputError(
         f"the table has no column {missing!r}",
@@ -266,6 +270,8 @@ def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
 
 def _parse_column(heading: str) -> _Column:
     text = to_plain_text(heading).strip("*` ")
+    if limit := _LIMIT_HEADING.match(text):
+        return _parse_limit_column(limit[1].lower(), limit[2])
     unit = None
     if found := re.search(
         r"[\[(/]\s*(" + "|".join(sorted(UNIT_SHORT_NAMES, key=len, reverse=True)) + r")\s*[\])]?\s*$", text
@@ -279,6 +285,22 @@ def _parse_column(heading: str) -> _Column:
         .lower()
     )
     return _Column(_NAMES.get(text, ""), text, unit, previous)
+
+
+def _parse_limit_column(name: str, unit: str) -> _Column:
+    if name == "effort" and unit in _EFFORT_UNITS:
+        return _Column(name, name)
+    allowed = UNIT_SHORT_NAMES if name != "effort" else {}
+    short = allowed.get(re.sub(r"\s*/\s*s$", "", unit) if name == "velocity" else unit)
+    if short is None:
+        units = {"effort": "[N] or [Nm]", "velocity": "[rad/s], [deg/s], [m/s] or [mm/s]"}
+        raise InputError(
+            "unknown unit in a heading",
+            where="header",
+            found=f"{name} [{unit}]",
+            remedy=f"write {units.get(name, '[rad], [deg], [m] or [mm]')}",
+        )
+    return _Column(name, name, short)
 
 
 # -- the lines around the table ------------------------------------------------------------------------
@@ -299,7 +321,7 @@ def _find_convention(grid: _Grid) -> str | None:
     """A heading with the index i-1 means "modified"."""
     if any(column.previous for column in grid.columns):
         return "modified"
-    # Below a title, a name such as "distal" must not select a convention.
+    # A name such as "distal" must not select a convention.
     if title := next(filter(None, map(_TITLE.search, grid.other_lines)), None):
         return title["convention"]
     text = "\n".join(map(to_plain_text, grid.other_lines))
@@ -334,7 +356,7 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _parse_coordinate_names(lines: list[str]) -> list[str]:
-    """Parse a line such as `with q1 = left, q2 = right`, or `with $q_{1}$ = left` in LaTeX."""
+    """Parse a line such as `with q1 = left, q2 = right`. LaTeX writes `$q_{1}$`."""
     plain = (
         re.sub(r"\$q_\{([0-9]+)\}\$ = ", r"q\1 = ", line.removeprefix(r"  \par\medskip ")) for line in lines
     )
@@ -370,7 +392,7 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _parse_variable(cell: str, where: str) -> dict[str, Any]:
-    """Parse a variable such as d3 or -θ2; d and theta state the kind of the joint, and q states no kind."""
+    """Parse a variable such as d3 or -θ2. Only d and theta determine the joint's kind."""
     found = re.fullmatch(r"(-?)\s*(theta|th|d|q)[\W_]*[0-9]*[\W_]*", to_plain_text(cell))
     if found is None:
         raise InputError(
@@ -437,7 +459,7 @@ def _add_offset(row: dict[str, Any], offset: str, units: Mapping[str, str | None
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace another joint's variable by a mimic rule.
 
-    Variable qi belongs to the i-th joint in `coordinates`, or to row i if `coordinates` is empty.
+    Variable qi belongs to the i-th joint in `coordinates`. If `coordinates` is empty, qi belongs to row i.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -471,7 +493,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a source is a table file; a .txt file that begins with "<" is a URDF."""
+    """Whether a source is a table file. A .txt file that begins with "<" is a URDF."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
     if (
@@ -499,7 +521,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or a product of exponentials if the file has the key M."""
+    """Read a table or a product of exponentials. Only a product of exponentials has the key M."""
     data = read_mapping(path)
     return (
         _add_place(screws_from_mapping, data, str(path)) if "M" in data else parse_table_data(data, str(path))

@@ -1,4 +1,4 @@
-"""Make tables from handwritten rows in Python, TOML, JSON or CSV, in the units that the data state.
+"""Make tables from handwritten rows in Python, TOML, JSON or CSV.
 
 All formats are converted to the same mapping:
 
@@ -11,10 +11,10 @@ All formats are converted to the same mapping:
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
 A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
-joint's value. In a modified table, a and alpha of row i are a_{i-1} and alpha_{i-1}. The entry `mimic` of a
-row is {mimicked_joint, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units
-apply to cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is the ratio
-of two joint values in SI units. An effort is in N or N m.
+joint's value. In a modified table, a and alpha of row i are a_{i-1} and alpha_{i-1}. A row's entry `mimic` is
+{mimicked_joint, multiplier, offset}. A row's entry `limit` is {lower, upper, velocity, effort}. The units
+apply to cells, limits and mimic offsets. The positions of base and tool have the unit `lengths`. A multiplier
+is the ratio of two joint values in SI units. An effort is in N or N m.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys of a table that have no effect on its numbers.
+#: Keys without effect on a table's numbers.
 _NOTE_KEYS = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
 _MAPPING_REMEDY = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
@@ -74,7 +74,7 @@ class NumberWithText(float):
 
 
 def half_digits_by_row(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return half a unit of each cell's last digit (m or rad), by row.
+    """Return half a unit of each cell's last digit, in m or rad.
 
     `data` must be a result of `urdfkin.dh.parse_table.mapping_from_text`.
     """
@@ -93,7 +93,7 @@ def _half_digit_in_si(name: str, value: object, units: Units) -> float:
 
 
 def half_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Return half a unit of a number's last digit; 0 for an exact number.
+    """Return half a unit of a number's last digit. An exact number gives 0.
 
     A whole number is exact unless `whole_is_rounded`.
 
@@ -139,7 +139,7 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_column_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles are usually multiples of 15 degrees or of pi/12. Lengths other than 0 rarely are.
+    Angles are usually multiples of 15 degrees or of pi/12. Nonzero lengths are rarely such multiples.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_list_form(row) for row in lists):
@@ -243,7 +243,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
         )
     if "sense" in fields:
         raise InputError(
-            "a row with a joint variable must not have `sense`, because the variable's sign is the sense",
+            "a row with a joint variable must not have `sense`: the variable's sign is the sense",
             where=at,
             found=f"{found}, sense {fields['sense']!r}",
             remedy="write only one of them",

@@ -2,10 +2,10 @@
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose in the zero configuration. Each joint has a screw (w, v), with the **angular part first**,
-as in the book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w.
-For a prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame. Body screws
-B = Ad(M^-1) S are in the tip frame.
+M is the tip's pose in the zero configuration. Each joint has a screw (w, v), with the **angular part first**.
+The book Modern Robotics and its code use the same order. For a revolute joint through p, w is the unit axis
+and v = p x w. For a prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame.
+Body screws B = Ad(M^-1) S are in the tip frame.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten numbers: the length of an axis, a pitch (m/rad), and the entries of R R^T - I.
+#: Tolerance of handwritten axis lengths and pitches (m/rad).
+#: The tolerance also applies to R R^T - I.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -149,9 +150,9 @@ class ProductOfExponentials(Displayable):
     def path(self) -> Path:
         """The product as rotations about z axes and translations along z axes.
 
-        For a revolute joint, exp([S] q) is A Rz(q) A^-1. For a prismatic joint, it is A Tz(q) A^-1. The z
-        axis of A is along the joint's axis. The constant poses are A_i^-1 A_{i+1}, and the last one is A_n^-1
-        M.
+        For a revolute joint, exp([S] q) is A Rz(q) A^-1. For a prismatic joint, exp([S] q) is A Tz(q) A^-1.
+        The z axis of A is along the joint's axis. The constant poses are A_i^-1 A_{i+1}. The last constant
+        pose is A_n^-1 M.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").path.poses(np.zeros(2))[:3, 3].tolist()
@@ -302,7 +303,7 @@ def screws_from_rows(
     T = as_floats(M, "M")
     if S.ndim != 2 or S.shape[1] != 6 or T.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
         raise InputError(
-            "screws must have the shape (n, 6), with a zero pose M (4, 4) and the frame `space` or `body`",
+            "screws must have the shape (n, 6), M the shape (4, 4), and `frame` must be `space` or `body`",
             found=f"{S.shape}, {T.shape}, {frame!r}",
         )
     if not (np.isfinite(S).all() and np.isfinite(T).all()):

@@ -100,5 +100,5 @@ def safe_repr(value: object) -> str:
         text = repr(value)
         return text if len(text) <= 60 else f"{text[:57]}..."
     except Exception:
-        # For example, the repr of an int with 5,000 digits raises ValueError.
+        # The repr of an int with 5,000 digits raises ValueError.
         return f"an object of type {type(value).__name__}"

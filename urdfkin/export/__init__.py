@@ -1,6 +1,6 @@
-"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains a self-test.
+"""Export the kinematics of a robot's frame as code.
 
-A LaTeX document contains the formulas, but no self-test.
+The code runs without urdfkin, and contains a self-test. A LaTeX document contains only the formulas.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ def code_for_language(code: FrameCode, to: str) -> FrameCode:
     if to != "sympy-exact" or code.exact is None:
         return code
     exact = code.exact()
-    # For a table and for screws, only the proof of `code` contains the locked joints.
+    # For tables and screws, only `code.proof` contains the locked joints.
     return replace(exact, maybe_proof=replace(exact.proof, lock=code.proof.lock))
 
 
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """Return an exported file's text with its digest.
 
-    `file`, for example `arm.c`, replaces the default file name in the text. The text keeps the default name
-    if `file` contains a character that is not an ASCII letter, a digit, "_", "." or "-".
+    `file`, for example `arm.c`, replaces the default file name in the text. Only ASCII letters, digits, "_",
+    "." and "-" are allowed in `file`. Otherwise, the text keeps the default name.
 
     Raises:
         UnknownNameError: `to` is not a key of `LANGUAGES`.

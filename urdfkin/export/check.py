@@ -1,11 +1,10 @@
-"""Run the test vectors of an exported file, and check that the file is unchanged.
+"""Run the test vectors of an exported file, and check its seal.
 
 The line "Seal" in the header contains a checksum of the file's text. The checksum does not prove who wrote
 the file.
 
-The check runs the file as code. Check a file from another person only if you would run that person's
-programs. The check runs a copy of the file in a separate folder. In the original folder, the file could
-import another file by accident, for example a `math.py`.
+The check runs the file as code. Check only files from people that you trust. The check runs a copy of the
+file in a separate folder. In its own folder, the file could import a wrong `math.py`.
 """
 
 from __future__ import annotations
@@ -41,12 +40,13 @@ _COMPILE_COMMANDS = {
         ("c++", "-std=c++11", "-x", "c++", *_STRICT_FLAGS),
     ),
 }
-#: Compiler and options for CUDA if the computer has nvcc and a GPU.
+#: Compiler and options for CUDA, with nvcc and a GPU.
 _GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that contain `EXPORT_MARK` and the word UNVERIFIED.
+#: Number of characters in the header of a file.
+#: The header contains `EXPORT_MARK`, and possibly the word UNVERIFIED.
 _HEADER_LENGTH = 2000
 #: Time limit (s) of a compiler or a test program.
-#: The code of a robot with a thousand joints compiles in one minute.
+#: Code with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 
@@ -56,7 +56,7 @@ def insert_seal(text: str) -> str:
 
 
 def _has_valid_seal(text: str) -> bool | None:
-    """Return whether the digest is correct, or None if the text has no digest."""
+    """Return whether the digest is correct, or None without a digest."""
     if (found := _SEAL_LINE.search(text)) is None:
         return None
     return _digest(_SEAL_LINE.sub(lambda line: line[1] + _DIGEST_PLACEHOLDER, text, count=1)) == found[2]
@@ -114,10 +114,7 @@ def _find_warnings(text: str) -> Iterator[str]:
         yield "these expressions were not compared with Pinocchio when they were written"
     sealed = _has_valid_seal(text)
     if sealed is None:
-        yield (
-            "the file has no seal (checksum), so changes of the file cannot be detected; export the file"
-            " again"
-        )
+        yield "the file has no seal (checksum), so urdfkin cannot detect changes; export the file again"
     elif not sealed:
         yield "the file was changed after it was written; export the file again"
 
@@ -129,7 +126,7 @@ def _has_gpu() -> bool:
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
     """Run the test vectors in double and single precision.
 
-    The check of a CUDA file includes the GPU functions only if nvcc and a GPU are available.
+    The check of GPU functions needs nvcc and a GPU.
     """
     name, suffix = _find_program_name(_MAIN_MACRO, text, file), file.suffix.lower()
     copy = _copy(text, folder / f"checked{suffix}")

@@ -1,4 +1,4 @@
-"""Collect the exported functions of one frame, and write the functions' expressions as text."""
+"""Collect the exported functions of one frame, and write their expressions as text."""
 
 from __future__ import annotations
 
@@ -30,8 +30,7 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame.
 
-    The names of the robot, the frame, the coordinates and the joints are escaped, so no name can end a
-    comment.
+    All names are escaped, so no name can end a comment.
 
     Attributes:
         identifiers: Lists of names in the code. The keys are "q" (coordinates), "v" and "a" (velocities), and
@@ -190,7 +189,7 @@ def _parse_quantities(names: Collection[str]) -> list[Quantity]:
 class Writer:
     """Writes expressions as code.
 
-    If `sine` is False, the code reads sines and cosines from its inputs and does not compute them.
+    If `sine` is False, the code reads sines and cosines from its inputs.
     """
 
     def __init__(
@@ -268,6 +267,7 @@ def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) ->
         own, result = _SIGN, f"-{text(x.operands[0], _PRODUCT)}"
     else:
         own = _PRECEDENCE[x.op]
-        # Brackets as in a + (b + c) keep the order of operations that was compared with Pinocchio.
+        # The order of operations was compared with Pinocchio.
+        # Brackets, as in a + (b + c), keep this order.
         result = f"{text(x.operands[0], own)} {x.op} {text(x.operands[1], own + 1)}"
     return result if own >= precedence else f"({result})"

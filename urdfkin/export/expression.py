@@ -1,7 +1,8 @@
-"""Symbolic numbers: arithmetic with these numbers creates a graph of expressions for exported code.
+"""Symbolic numbers for exported code.
 
-The equations of `urdfkin.kinematics.equations` accept symbolic numbers instead of floats. The graph
-simplifies each new expression:
+Arithmetic with symbolic numbers creates a graph of expressions. The equations of
+`urdfkin.kinematics.equations` accept symbolic numbers instead of floats. The graph simplifies each new
+expression:
 
 | Expression | Simplified expression |
 |---|---|
@@ -29,7 +30,7 @@ from typing import Any
 
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: A number in an equation is a float or a node of the graph.
+#: A number is a float or a node of the graph.
 Number = Any
 _EQUATION_NUMBERS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
@@ -86,7 +87,7 @@ class Node:
 class Graph:
     """The expressions of one function."""
 
-    #: Constant that replaces products with 0 and differences x - x.
+    #: Value of x - x and of products with 0.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -145,7 +146,7 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_equation_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Wrap an equation, so that each new node stores the number of the outermost equation."""
+        """Wrap an equation. Each new node stores the number of the outermost equation."""
         found = _EQUATION_NUMBERS.match(equation.__doc__ or "")
         if found is None:
             return equation
@@ -176,7 +177,7 @@ def _negated_operand(x: Number) -> Number:
 
 
 def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
-    """Sort operands of a commutative operation, so that x + y and y + x are the same node."""
+    """Sort operands of a commutative operation. Then x + y and y + x are one node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 

@@ -80,10 +80,11 @@ if TYPE_CHECKING:
     from urdfkin.verify.usd_check import SinglePrecisionErrors, SingleRoundingTerms
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
+#: Gravity in m/s^2, in world axes.
+#: Pinocchio and MuJoCo have the same default value.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations that determine the generic rank of a Jacobian.
+#: Number of random configurations in a rank computation.
 _RANK_SAMPLES = 3
 #: `dir(robot)` omits these internal members.
 _INTERNAL_NAMES = {"plan", "single", "single_terms", "verifier"}
@@ -171,21 +172,24 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Terms of `single` for each joint of a USD stage in single precision; None without a USD stage.
+        #: Maps a joint to its terms of `single`.
+        #: None: the source is not a USD stage in single precision.
         self.single_terms: SingleRoundingTerms | None = None
-        #: USD path of each link's prim (scene object); empty without a USD stage.
+        #: Maps a link to the USD path of its prim.
+        #: Without a USD stage, the mapping is empty.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        # Pinocchio checks each result of the evaluators in `_checked`, and no result of those in `_prepared`.
+        # Evaluators in `_checked` check every result with Pinocchio.
+        # Evaluators in `_prepared` check no result.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Copies have empty caches and a verifier of their own.
+        # A copy has empty caches and its own verifier.
         empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_checked": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
@@ -515,8 +519,9 @@ class Robot(Displayable):
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
         The same seed gives the same configurations. In some robots, the limits of a mimic joint allow at most
-        one value of the mimicked joint. The configurations of such a robot respect the limits of the mimicked
-        joint, but may exceed the limits of the mimic joint. `limit_violations` then reports the mimic joint.
+        one value of the mimicked joint. The configurations of such a robot respect the mimicked joint's
+        limits. The configurations may exceed the mimic joint's limits. `limit_violations` then reports the
+        mimic joint.
 
         Args:
             n: Number of configurations.
@@ -551,7 +556,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # The returned lines mention values that are probably in degrees, so a warning is not needed.
+        # The returned lines already mention values that look like degrees.
         q = configuration.parse_finite(self.tree, q, "q", warn=False)
         return configuration.limit_violations(self.tree, q)
 
@@ -588,8 +593,8 @@ class Robot(Displayable):
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
         The result is the shortest motion, as in Pinocchio's `difference`. `integrate(start, difference(start,
-        end))` gives the same pose of the robot as `end`. Therefore, a continuous joint makes the full
-        rotation if a full turn of this joint moves a mimic joint to another pose.
+        end))` gives the same pose of the robot as `end`. A full turn of a continuous joint may move a mimic
+        joint to another pose. Such a continuous joint makes the full rotation.
 
         Args:
             start: (..., nq) rad, m.
@@ -711,7 +716,8 @@ class Robot(Displayable):
         if joints is not None:
             reject_set(joints, "joints")
             joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints")]
-        # The URDF text of these sources contains no masses. Only MJCF and USD files have a digest.
+        # Only MJCF and USD files have a digest.
+        # urdfkin writes no masses into the URDF of these sources.
         has_masses = not self.origin.sha256 and self.source not in ("<pinocchio.Model>", "<yourdfpy>")
         return Conversion(self.tree, self.urdf, find_convention(name), joints, has_masses=has_masses)
 
@@ -861,8 +867,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
-        # Subclasses of str may print names differently in error messages.
-        # A plain str avoids the difference.
+        # A subclass of str can print itself differently in messages.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(
             self.tree, self.plan, frame, _ALIGNED, None, (q,), additional_frames=(name,), relative_to=name
@@ -945,8 +950,8 @@ class Robot(Displayable):
         In LOCAL_WORLD_ALIGNED, J a + J-dot v is the classical acceleration, which `acceleration` returns. In
         LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in LOCAL
         and WORLD, J a + J-dot v is the *spatial* acceleration. Let p'' be the linear part of `acceleration`.
-        Let p' and w be the linear and the angular part of `velocity`. If all three methods receive the same
-        `reference`, the linear part of the spatial acceleration is p'' - w x p'. J a + J-dot v does not
+        Let p' and w be the linear and the angular part of `velocity`. If all three methods use the same
+        `reference`, the *spatial* acceleration has the linear part p'' - w x p'. J a + J-dot v does not
         contain the acceleration that a moving base causes.
 
         >>> import urdfkin
@@ -1096,8 +1101,8 @@ class Robot(Displayable):
             rows: Rows of J: "all", "linear" or "angular".
 
         Raises:
-            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or an
-                invalid value of `rows`.
+            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast; or
+                an invalid `rows`.
             VerificationError: Pinocchio's Jacobian differs by more than the bound.
 
         >>> import urdfkin
@@ -1158,9 +1163,9 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a configuration is nearer to the singularity than `nearest`. If
-                Pinocchio checks the call, the smallest accepted distance is at least the rounding error of
-                the rotation (about 1e-13 rad). A quaternion has no singularity.
+            RepresentationSingularityError: a configuration is nearer to the singularity than `nearest`. In a
+                checked call, the smallest accepted distance is at least the rotation's rounding error (about
+                1e-13 rad). A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1277,11 +1282,11 @@ class Robot(Displayable):
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
         The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding. The inputs of these
-        equations are the decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of
-        an interval are doubles. With the default `digits`, the two ends are nearly always neighbouring or
-        equal; an interval around 0 is about 1e-38 wide. The result also states whether urdfkin's and
-        Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each joint between
-        the root link and the frame.
+        equations are the URDF's decimals, and the doubles `q`, `v`, `a` and `base`. Both ends of an interval
+        are doubles. With the default `digits`, the two ends are nearly always neighbouring or equal. An
+        interval around 0 is about 1e-38 wide. The result also states whether urdfkin's and Pinocchio's values
+        lie in the intervals. The computation takes less than 1 ms for each joint between the root link and
+        the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1297,8 +1302,8 @@ class Robot(Displayable):
                 pair of joints.
 
         Raises:
-            InputError: an argument is a batch, has a wrong length or is not finite, or `digits` is not in 15
-                to 10,000.
+            InputError: an argument is a batch, has a wrong length or is not finite; `digits` is not in 15 to
+                10,000.
             UnknownNameError: the frame or reference does not exist.
 
         >>> import urdfkin
@@ -1537,7 +1542,7 @@ class Robot(Displayable):
                 rows have only the four parameters.
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the last row ends at the tip if its four parameters suffice. "flange": the last row
-                ends on the last joint axis, and the tool transform leads from this axis to the tip.
+                ends on the last joint axis. The tool transform leads from this axis to the tip.
             parallel_offset: Row for the sum of the offsets d along consecutive parallel axes. "last": the row
                 of the last axis. "first": the row of the first axis. "each": no sum, each row contains the
                 offset of its own link.
@@ -1550,14 +1555,14 @@ class Robot(Displayable):
                 axis of the last row.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
                 joint's origin in the URDF. `make_dh_table` lists exceptions, such as the first joint.
-                "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint, so
-                the length a between these two axes is 0. The previous joint is used only if the next joint is
-                not revolute.
-            like: A published table. The result copies the positive joint directions, the directions of the x
-                axes, and the offsets d along parallel axes from this table. The result also copies theta of
-                the first and last row. From a standard table, the result also copies a and alpha of the last
-                row. All other numbers come from the URDF. If `like` is used, the arguments `flip`, `first`,
-                `last`, `sign` and `parallel_offset` must have their default values.
+                "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint. The
+                length a between these two axes is then 0. The previous joint is used only if the next joint
+                is not revolute.
+            like: A published table. From this table, the result copies positive joint directions, directions
+                of x axes, and offsets d along parallel axes. The result also copies theta of the first and
+                last row. From a standard table, the result also copies a and alpha of the last row. All other
+                numbers come from the URDF. If `like` is used, the arguments `flip`, `first`, `last`, `sign`
+                and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1734,10 +1739,10 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # If `frame` is a plain str and `reference` is the default, `frame` is the key.
-        # This key is fast. The hash of a `Reference` is slow, because `Reference` is an enumeration.
-        # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
-        # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
+        # The hash of a `Reference` is slow.
+        # With the default reference, a plain str is the key.
+        # All other keys are tuples with the class of `frame`.
+        # `LinkFrame("link:a") == "link:a"`, but their frames can differ.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

@@ -41,9 +41,8 @@ class MotionCheck:
 
     Attributes:
         units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
-            Here eps is the machine epsilon. Each number of the quantity is a sum of terms. The scale of the
-            number is an upper bound on the sum of the absolute values of these terms
-            (`urdfkin.verify.bounds`).
+            Here eps is the machine epsilon. Each number of the quantity is a sum of terms. The scale is an
+            upper bound on the sum of the terms' absolute values (`urdfkin.verify.bounds`).
         bound_ratio: (n,) `units` divided by `bound`. A value above 1 is a disagreement.
         bound: (n,) largest difference that rounding errors can cause in each sample, divided by eps * scale.
     """
@@ -162,7 +161,7 @@ def frame_motion(
 
     Args:
         robot: The robot.
-        motion: A trajectory, for example from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n,
+        motion: A trajectory, for example from `urdfkin.read_trajectory`. Or q (n, nq), v (n, nv) and a (n,
             nv) in rad, m and s.
         frame: Name of a link or joint.
         reference: Reference frame of velocity, acceleration and Jacobian.

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
 #: Warnings that help only the author of a URDF file.
-#: urdfkin does not show these warnings for a URDF that urdfkin generated.
+#: For a generated URDF, urdfkin hides these warnings.
 _FINDINGS_FOR_AUTHORS = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -60,7 +60,7 @@ class LoadOptions(TypedDict):
     joints: Sequence[str] | None
 
 
-def load(  # noqa: PLR0911  (many returns): each kind of source has its own branch
+def load(  # noqa: PLR0911  (many returns): one branch for each kind of source
     source: Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
@@ -299,7 +299,7 @@ def _load_usd(
 
 
 def _load_without_options(robot: Robot, text: UrdfText, **options: Any) -> Robot:
-    """Load a text as a robot with a fixed root, without locked joints and with all mimic rules."""
+    """Load a robot from a text: fixed root, no locked joints, all mimic rules."""
     origin = robot.origin
     plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
     return robot if plain else make_robot(text, **options)

@@ -7,9 +7,9 @@
 The motion starts and ends at rest, and the acceleration is continuous.
 
 *Differences.* Joint velocities that a file lacks are central differences of the configurations. Their error
-is proportional to the square of the time step. At both ends of the trajectory, the error of joint
-accelerations from configurations is larger, and proportional to the time step. To estimate all errors, the
-differences are also computed from every second sample.
+is proportional to the square of the time step. Joint accelerations from configurations have a larger error at
+the first and last sample. This error is proportional to the time step. For an estimate of all errors, urdfkin
+also computes the differences from every second sample.
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
 At the end of this range, a wrapped angle jumps by one turn. The quaternion of a floating joint may change its
@@ -57,12 +57,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of one sample in each array, for example `(nq,)` for q.
+#: Shape of one sample for each array: `{"q": (nq,)}`.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
-    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
+    """Read arrays (n, ...) of finite numbers from an .npz file, with one n.
 
     Pickled objects are rejected, because unpickling can execute code from the file.
     """
@@ -120,11 +120,12 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: Minimum number of samples; a second difference needs three.
+#: Minimum number of samples. A second difference needs three samples.
 _MIN_SAMPLES = 3
-#: Names of the .npz arrays with the root link's pose, velocity and acceleration.
+#: Names of .npz arrays that describe the root link's motion.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Times cause a note if their rounding exceeds this fraction of the smallest step.
+#: Maximum rounding error of times, divided by the smallest step.
+#: Above this limit, the trajectory has a note.
 _TIME_ROUNDING = 1e-6
 
 
@@ -206,7 +207,7 @@ def make_line_trajectory(
 
     Raises:
         InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length or
-            is a batch; or a number is not finite.
+            is a batch; a number is not finite.
         RangeError: the duration is so short that an acceleration is not a finite double.
     """
     duration = as_finite_float(duration, "the duration")
@@ -231,8 +232,9 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # For a planar or floating joint, `step` is a constant twist in the moving frame.
-    # Therefore, v and a of all joints are `step` times the time derivatives `s_1` and `s_2` of s.
+    # v = s_1 * step and a = s_2 * step for each joint.
+    # For planar and floating joints, `step` is a twist.
+    # This twist is constant in the moving frame's axes.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -264,8 +266,7 @@ def read_trajectory(
     Raises:
         SourceError: the file cannot be read.
         InputError: the header is missing, or a column or an array is unknown, missing or duplicate. Other
-            reasons: a cell is not a number, a unit is wrong, time does not increase, or there are too few
-            samples.
+            reasons: a cell is no number, a unit is wrong, time does not increase, or samples are too few.
         UnknownNameError: the convention does not exist.
 
     >>> import urdfkin
@@ -323,7 +324,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
         coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # The error of the acceleration is proportional to h^order, where h is the time step.
+        # The error of a is proportional to (time step)^order.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -342,7 +343,10 @@ def _central_differences(
 
 
 def _estimate_error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of `fine`; the error of `coarse` is 2^`order` times as large."""
+    """Estimate the largest error of `fine`.
+
+    The error of `coarse` is 2^`order` times as large.
+    """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
@@ -385,7 +389,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number in q, v or a by name, such as "m/s"; "" for quaternions."""
+    """Map the names of q, v or a to units, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -405,7 +409,10 @@ def _read_npz(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 
 
 def _central_velocities(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return joint velocities (n, nv); for planar and floating joints, in the moving frame's axes."""
+    """Return joint velocities (n, nv).
+
+    For planar and floating joints, the moving frame's axes apply.
+    """
     slopes = _differentiate(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -448,11 +455,10 @@ def read_columns(
     requires_header: bool = False,
     units: Mapping[str, str] | None = None,
 ) -> Mapping[str, FloatArray]:
-    r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
+    r"""Parse CSV text into columns (n,) of finite numbers in SI units; n >= 0.
 
     Empty lines and lines that begin with # are skipped. The first other line may name the columns, in any
-    order. Otherwise, the columns are `required`. `units` contains the SI unit of each column that may have a
-    unit in its heading.
+    order. Otherwise, the columns are `required`. `units` maps the columns that may state a unit to SI units.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -489,12 +495,12 @@ def read_columns(
 
 
 _TIMES = ("t", "time", "timestamp")
-#: Number of time units in one second, by the name of the unit.
+#: Maps a time unit's name to units per second.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: Patterns of column names that end with a unit: `v:elbow_deg_s`, `a:elbow_rad_per_s2`, `elbow_deg`.
+#: Patterns such as `v:elbow_deg_s`, `a:elbow_rad_per_s2` or `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -502,7 +508,7 @@ _SUFFIXES = (
 
 
 def _parse_heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column name and the unit in a heading; the unit is "" if it is an SI unit or missing.
+    """Return a heading's column name and unit; "" for a missing or SI unit.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_parse_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -555,13 +561,13 @@ def _parse_unit(text: str, where: str, expected: str) -> str:
 
 def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
-        # For k * 15 degrees, `radians_from_degrees` returns the double k * math.pi / 12.
+        # Exactly: radians_from_degrees(15.0 * k) == k * math.pi / 12.
         return np.fromiter(map(radians_from_degrees, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
 def count_cells(text: str, where: str) -> int:
-    """Return the number of cells in the first line that is neither empty nor a comment, or 0."""
+    """Return the number of cells in the first line, except empty lines and comments; 0 for none."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
@@ -585,7 +591,7 @@ def parse_numbers(
 
 
 def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and the cells of each line; skip empty lines and lines that begin with #."""
+    """Yield each line's number and cells, except empty lines and # comments."""
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         for row in reader:
@@ -596,7 +602,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a line contains column names; a name can be a number, such as "1"."""
+    """Return whether a line contains column names, which may be numbers such as "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -624,16 +630,17 @@ def _check_columns(
         )
 
 
-#: If a joint's samples span more than this angle (rad), the samples stay unchanged.
-#: The margin of 0.02 covers angles that are rounded to two decimals.
+#: Largest span (rad) of the samples that urdfkin unwraps.
+#: Angles in a file may be rounded to two decimals.
+#: The margin of 0.02 covers the rounding of two angles.
 _ONE_TURN = math.tau + 0.02
-#: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.
-#: For example, rotations by 130 and by -230 degrees lead to the same pose.
-#: At 120 degrees, the rotation in the other direction is twice as large.
+#: Largest rotation (rad) between samples with a clear direction.
+#: Rotations by 120 and -240 degrees give the same pose.
+#: urdfkin assumes the rotation by 120 degrees, which is shorter.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
-#: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error.
-#: For a multiplier m with |m| > 1, the limit is |m| times this value.
+#: Maximum rounding error (rad, m) of a mimic joint's value.
+#: A multiplier |m| > 1 multiplies this limit by |m|.
 _MIMIC_ROUNDING = 1e-9
 
 
@@ -645,10 +652,12 @@ class UnwrappedSamples:
 
 
 def unwrap_angles(tree: KinematicTree, q: FloatArray) -> UnwrappedSamples:
-    """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
+    """Unwrap angles in time-ordered samples (n, nq).
 
-    Between two samples, a joint is assumed to turn in the shorter direction. If the samples of an angle span
-    more than one turn, the samples stay unchanged.
+    Only continuous, planar and floating joints are unwrapped.
+
+    Between two samples, a joint is assumed to turn in the shorter direction. An angle with a span of more
+    than one turn stays unchanged.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -664,7 +673,7 @@ def unwrap_angles(tree: KinematicTree, q: FloatArray) -> UnwrappedSamples:
 
 
 def _unwrap_joint_angle(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap the angle of a continuous or planar joint; the angle is the joint's last coordinate."""
+    """Unwrap the last coordinate of a continuous or planar joint, an angle."""
     angle, notes = own[:, -1], []
     new = own.copy()
     within_one_turn = bool(np.ptp(angle) <= _ONE_TURN)

@@ -1,4 +1,7 @@
-"""Read the visual shapes of a URDF's links for the viewer, and load mesh files with trimesh."""
+"""Read the visual shapes of a URDF for the viewer.
+
+The library trimesh loads mesh files.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Maximum size (bytes) of a mesh, material or texture file that the viewer shows.
+#: Maximum size of a mesh, material or texture file, bytes.
 LARGEST_FILE = 200_000_000
 
 
@@ -31,7 +34,10 @@ def _load_mesh(file: Path) -> Any:
     import trimesh
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
-        """Finds only materials and textures that are regular files in the mesh's folder or a subfolder."""
+        """Finds materials and textures in the mesh's folder or a subfolder.
+
+        Other files, and files that are not regular, are not found.
+        """
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -46,7 +52,7 @@ def _load_mesh(file: Path) -> Any:
 
 
 def make_mesh(shape: Shape) -> Any | None:
-    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame.
+    """Return a shape's mesh as a coloured trimesh.Trimesh in the link's frame.
 
     Return None if the shape has no readable mesh file with faces.
     """
@@ -69,7 +75,10 @@ def make_mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape, in the link's frame. A mesh must be readable."""
+    """Return the corners (8, 3) of a box around a shape.
+
+    The corners are in the link's frame. A mesh must be readable.
+    """
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = make_mesh(shape).bounds  # type: ignore[union-attr]
@@ -93,7 +102,7 @@ class Shape:
         size: Size in m: (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere. A mesh has
             the scale factors (x, y, z) instead.
         colour: Red, green, blue and opacity, each from 0 to 1. None: the colours of the mesh's file, or
-            `GREY` for STL files and other shapes.
+            `GREY` for STL files and shapes without a file.
     """
 
     link: str
@@ -110,8 +119,11 @@ class Shape:
 
 
 def shapes(robot: Robot) -> list[Shape]:
-    """Return all visuals of a robot, except malformed visuals and unknown geometries such as a capsule."""
-    root = parse_xml(robot.urdf)  # The URDF of a loaded robot is already checked.
+    """Return the visuals of a robot.
+
+    Malformed visuals and unknown geometries, such as a capsule, are missing.
+    """
+    root = parse_xml(robot.urdf)  # A loaded robot's URDF is already checked.
     urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []
@@ -187,9 +199,11 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
 
 
 def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
-    """Return the path of the mesh file at an address in a URDF; None if there is no such file.
+    """Return the mesh file at an address in a URDF.
 
-    A relative path in the URDF is relative to the folder of the URDF.
+    Return None if there is no such file.
+
+    A relative path is relative to the folder of the URDF.
     """
     candidates = list(_candidates(address, urdf_file))
     try:
@@ -202,7 +216,7 @@ def _candidates(address: str, urdf_file: Path | None) -> Iterator[Path]:
     if not address or "\0" in address:
         return
     if (parts := split_uri(address)) is not None:
-        # Some URDFs have a third slash before the package's name: package:///NAME.
+        # Some URDFs have a third slash: package:///NAME.
         name, path = parts if parts[0] else parts[1].partition("/")[::2]
         package = find_package(name, urdf_file)
         if package is not None:

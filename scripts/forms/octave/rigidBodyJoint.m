@@ -1,4 +1,4 @@
-% Stands in for the Robotics System Toolbox's class.
+% Replaces the class of the Robotics System Toolbox.
 classdef rigidBodyJoint < handle
     properties
         Name = '';

@@ -1,4 +1,5 @@
-% Stands in for the Robotics System Toolbox's class where there is no MATLAB: what its documentation says.
+% Replaces the class of the Robotics System Toolbox without MATLAB.
+% This class follows the documentation of the toolbox.
 classdef rigidBodyTree < handle
     properties
         BaseName = 'base';

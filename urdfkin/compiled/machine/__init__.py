@@ -1,9 +1,9 @@
-"""The modules that need Numba: number types, kernels, and the cache of kernels.
+"""Modules that need Numba: number types, kernels, cache of kernels.
 
-Numba reads settings from a file `.numba_config.yaml` in the current folder, during its import and before each
-compilation. The file can select a cache folder, and Numba executes the files in the cache. A malicious file
-could therefore run any code. This package makes Numba read only environment variables, unless a program
-imports Numba first.
+Numba reads settings from `.numba_config.yaml` in the current folder. This happens during Numba's import and
+before each compilation. The file can select a cache folder. Numba executes the files of the cache. A
+malicious file could therefore run any code. With this package, Numba reads only environment variables, unless
+a program imports Numba first.
 """
 
 from __future__ import annotations

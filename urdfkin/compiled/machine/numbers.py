@@ -1,4 +1,6 @@
-"""Number types for compiled code: a value of such a type is one double or a vector of doubles.
+"""Number types for compiled code.
+
+A value is one double or a vector of doubles.
 
 | Type or function | Value |
 |---|---|
@@ -8,9 +10,8 @@
 | `zero()`, `one()` | 0 and 1, known at compile time |
 | `unused()` | placeholder for a number that is not needed |
 
-In the sum x y + z, the product and the sum are one fused multiply-add, which is rounded only once. This
-module, and not the compiler, decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are
-therefore exactly the same doubles, on every machine.
+The sum x y + z is one fused multiply-add, with only one rounding. This module decides which operations are
+fused, not the compiler. `Lanes(1)` and `Lanes(8)` therefore give exactly the same doubles, on every machine.
 
 Each operation with `unused()` gives `unused()`. Operations with constants are simplified at compile time.
 """
@@ -54,7 +55,10 @@ class Product(types.Type):
 
 
 class ConstantNumber(types.Type):
-    """Type of `zero()`, `one()` or `unused()`: value 0, 1 or None at compile time."""
+    """Type of `zero()`, `one()` and `unused()`.
+
+    The value at compile time is 0, 1 or None.
+    """
 
     def __init__(self, value: int | None) -> None:
         self.value = value
@@ -227,7 +231,7 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
 
 
 def _lower_sum(*, negative: bool) -> Callable[..., Any]:
-    """Return the function that generates code for x + y, or for x - y if `negative`."""
+    """Return the code generator for x + y, or for x - y if `negative`."""
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def apply_sign(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Compare the cells and the tip's pose of a published table with a URDF."""
+"""Compare a published table with a URDF: the cells and the tip's pose."""
 
 from __future__ import annotations
 
@@ -37,22 +37,26 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
-#: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
+#: Default tolerance (m) at the tip.
+#: The tolerance covers two cells rounded to 0.1 mm.
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported if their correction reduces the tip error to at most this fraction.
-#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach also suffices.
+#: Cell corrections must reduce the tip error to this fraction.
+#: Otherwise, no differing cells are reported.
+#: A tip error up to `NEGLIGIBLE_ERROR` * reach also suffices.
 _MAX_CELLS_ERROR_FRACTION = 0.5
-#: The correction of a mistake must reduce the tip error to the tolerance, or to at most this fraction.
+#: A mistake's correction must reduce the error to this fraction.
+#: A tip error within the tolerance also suffices.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Without a fit, more cells can differ than after a fit.
-#: The cells are reported only if at most this number of additional cells differ.
+#: Maximum number of additional differing cells without a fit.
+#: Above this number, `unfitted_differences` is empty.
 _MAX_MORE_UNFITTED_CELLS = 2
-#: If the tip moves by at most this fraction of the path length, the path length is the reach.
+#: Maximum motion of a fixed tip, divided by path length.
+#: With a fixed tip, the reach is the path length.
 _FIXED_TIP_SPREAD = 1e-6
-#: Half a unit of each cell's last digit, in metres or radians.
+#: Half a unit of each cell's last digit (m, rad).
 HalfDigits = Sequence[Mapping[str, float]]
 
 
@@ -135,7 +139,8 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach (m).
 
-    The path length can be far larger, because tables without Hayati rows may have offsets of kilometres.
+    The path length can be far larger than the reach. A table without Hayati rows may have offsets of
+    kilometres.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -153,7 +158,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
             "the table and the path have different joints",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"{in_table or 'none'} in the table, {in_urdf or 'none'} in the URDF",
-            remedy="choose a base and a tip so that the path has exactly the joints of the table",
+            remedy="choose a base and a tip with exactly the table's joints on the path",
         )
     check_lengths_of_table(chain, reference)
 
@@ -198,16 +203,16 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains a cell of standard row i, or None.
+    """Return the reference's row index for a cell of standard row i.
 
-    In a modified table, a, alpha and beta of standard row i are in the next row.
+    In a modified table, row i + 1 contains a, alpha and beta. None: no row contains the cell.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Return an array (n, 5) with 1 for each standard cell that the reference contains, else 0."""
+    """Return a mask (n, 5): 1 for cells in the reference, else 0."""
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
@@ -217,10 +222,10 @@ def _cell_mask(reference: DHTable) -> FloatArray:
 def _find_compensated_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row index and name of each cell with an error that a fit compensates."""
+    """Return row index and name of each cell that a fit compensates."""
     compensated = list[tuple[int, str]]()
     if reference.convention is DHConvention.MODIFIED:
-        # In the standard table, these cells are a part of the base.
+        # In the standard table, the base contains these cells.
         compensated += [(0, cell) for cell in ("a", "alpha")] + [(0, "beta")] * bool(reference.rows[0].beta)
     for i, k in find_compensated_cells(fitted, check_targets):
         reference_index = _reference_row_index(reference, i, CELLS[k])
@@ -296,10 +301,11 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 
 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
-    """Return bounds (m, rad) of the tip error, without rounding errors and mimic rules.
+    """Return bounds (m, rad) of the tip error.
 
-    The bounds hold for all angles, and for displacements within the limits. For a prismatic joint without a
-    range (`has_range`), the limits are -`ASSUMED_LIMIT` and `ASSUMED_LIMIT`.
+    The bounds exclude rounding errors, and ignore mimic rules. The bounds hold for all angles, and for
+    displacements within the limits. If `has_range` is false, the limits are -`ASSUMED_LIMIT` and
+    `ASSUMED_LIMIT`.
     """
     mechanisms = Mechanism(_make_tree_without_mimic(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -310,7 +316,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_tree_without_mimic(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Convert a path to a tree without mimic rules, with the table's link names."""
+    """Convert a path to a tree with the table's link names. Mimic rules are removed."""
     travels, z = _prismatic_ranges(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:

@@ -1,4 +1,4 @@
-"""Store the result of comparing a table with a URDF, and write the result as text."""
+"""Result of a comparison of a table with a URDF, and its text."""
 
 from __future__ import annotations
 
@@ -20,12 +20,16 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: After a correction of cells, tip errors up to this number count as zero (rad, or m per m of reach).
-#: The rounding errors of a fit are far below this number, and those of data sheets far above.
+#: Tip errors up to this number count as zero.
+#: Unit: rad, or m per m of reach.
+#: Rounding errors of a fit are far below this number.
+#: Rounding errors of data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
-#: `fit_resolution` increases smaller tip errors to this number (rad, or metres per metre of reach).
+#: Smallest tip error in `fit_resolution`.
+#: Unit: rad, or m per m of reach.
 _MIN_TIP_ERROR = 1e-12
-#: Factor of half a digit, above 1 because doubles cannot represent most decimal numbers exactly.
+#: Factor of half a digit.
+#: Doubles represent most decimal numbers only approximately.
 _HALF_DIGIT_MARGIN = 1.0 + 1e-6
 
 
@@ -37,9 +41,9 @@ class CellDifference:
 
     Attributes:
         row: Index of the row, from 0.
-        tip_displacement: Largest distance (m) by which a correction of this cell moves the tip, on samples.
+        tip_displacement: Largest motion (m) of the tip by this cell's correction, on samples.
         half_digit: Half a unit of the last digit of `reference`.
-            0 for an exact value, and for a value without text.
+            An exact value and a value without text have 0.
     """
 
     row: int
@@ -141,11 +145,12 @@ class TableComparison:
             The bounds hold for all angles, and for displacements within the limits.
             Without limits, a prismatic joint is assumed within 10 m of zero.
         unfitted_metres, unfitted_radians: Tip errors without a fit.
-        unfitted_differences: Cells to change, so that the table agrees with the URDF without a fit.
-            Empty if `is_fitted` is false, if `mistakes` is not empty, or if a tip error remains.
+        unfitted_differences: Cells to change for agreement with the URDF without a fit.
+            Empty if `is_fitted` is false or `mistakes` is not empty.
+            Empty if a tip error remains.
             Empty if more than len(differences) + 2 cells must change.
-        not_compared: Row index and name of each cell that a fit cannot check, because a change of base, tool
-            or joint offsets has the same effect.
+        not_compared: Row index and name of each cell that a fit cannot check.
+            A change of base, tool or joint offsets has the same effect.
         residual: Tip error after cell corrections, m.
     """
 
@@ -185,7 +190,7 @@ class TableComparison:
 
     @property
     def rounding_error(self) -> float:
-        """Largest tip error due to rounding (rad, or m per m of reach and travel)."""
+        """Largest rounding error of the tip. The unit is rad, or m per m of reach and travel."""
         return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
     @property
@@ -202,8 +207,7 @@ class TableComparison:
     def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        The proof has the conditions of `metres_bound`: without limits, prismatic joints stay within 10 m of
-        zero.
+        The proof has the conditions of `metres_bound`.
         """
         return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 
@@ -226,14 +230,14 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether both limits are finite, and lower < upper.
 
-    If the limits are equal, poses do not show the joint's direction of motion. If a URDF omits the limits,
-    both are 0.
+    If the limits are equal, poses do not show the joint's positive direction. If a URDF omits the limits,
+    lower = upper = 0.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
 
 def fit_resolution(relative_error: float, radians: float) -> float:
-    """Return the rounding step of fitted numbers: a power of ten, such as 1e-4.
+    """Return the rounding step of fitted numbers, a power of ten.
 
     `relative_error` is in m per m of reach.
     """
@@ -397,9 +401,7 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
     elif comparison.is_exact_unfitted:
         parts.append("Every cell agrees with the URDF.")
     elif comparison.is_exact:
-        parts.append(
-            "After the fit of base, tool and joint offsets, every compared cell agrees with the URDF."
-        )
+        parts.append("After the fit, every compared cell agrees with the URDF.")
     if comparison.not_compared and not comparison.is_exact_unfitted:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in comparison.not_compared)
         same = "a change of base, tool or joint offsets has the same effect"
@@ -423,7 +425,10 @@ def _difference_table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset, rounded to a multiple of `fine`, or to a multiple of 15 degrees within `fine`."""
+    """Round an offset to a multiple of `fine`, and format it.
+
+    An angle within `fine` of a multiple of 15 degrees becomes this multiple.
+    """
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

@@ -1,6 +1,6 @@
-"""Find the joint signs and directions of x with which a reference table fits a path.
+"""Find joint signs for which a reference table fits a path.
 
-The author of a table makes three choices that do not change the robot:
+A table's author makes three choices without effect on the robot:
 
 | Choice | In the search |
 |---|---|
@@ -8,8 +8,8 @@ The author of a table makes three choices that do not change the robot:
 | direction of x along each common normal | sign, +1 or -1 |
 | zero position of each theta | computed from the signs |
 
-Each combination of signs gives a table of the path. A beam search keeps the combinations whose tables differ
-least from the reference table.
+Each combination of signs gives a table of the path. A beam search keeps the tables that are closest to the
+reference table.
 """
 
 from __future__ import annotations
@@ -34,11 +34,14 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: Cost (m) of a joint with sign -1, so that of equally good alignments, the URDF's joint signs are chosen.
+#: Cost (m) of a joint with sign -1.
+#: The cost prefers the URDF's signs among equally good alignments.
 _REVERSAL_COST = 1e-9
-#: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
+#: Weight of length differences next to a prismatic axis.
+#: A prismatic axis can move to any parallel line.
 _NEAR_PRISMATIC_WEIGHT = 1e-3
-#: Axes closer than this distance (m) count as coinciding, so x can have any direction.
+#: Axes closer than this distance (m) count as coinciding.
+#: Between coinciding axes, x can have any direction.
 _COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
@@ -65,19 +68,20 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """Signs and offsets with which the first joints of a path match the first rows of a table.
+    """Signs and offsets of a path's first joints.
 
-    Rz(phi_in) Tz(delta_in) leads from the last joint's DH frame to its URDF frame.
+    These joints match the first rows of the reference table. For the last of these joints,
+    T_dh_urdf = Rz(phi_in) Tz(delta_in).
     """
 
-    cost: float  # Weighted sum (m) of the differences of cells, and a penalty for each reversed joint.
+    cost: float  # Weighted sum (m) of cell differences and `_REVERSAL_COST`.
     senses: tuple[int, ...]
     offsets: tuple[float, ...]  # The last joint's offset is missing.
     phi_in: float
     delta_in: float
     base: FloatArray
-    #: Row index of a joint offset that can be chosen freely, and a sign.
-    #: With sign -1, an increase of this offset rotates the axis x about -z.
+    #: Row index of a free joint offset, and a sign.
+    #: With sign -1, an increasing offset rotates x about -z.
     free_offset: tuple[int, float] | None = None
 
 
@@ -87,7 +91,7 @@ def find_sign_fits(
     """Return up to `count` alignments with a standard table, best first.
 
     Path and table must have equal joint kinds. With prismatic joints, several combinations of signs may give
-    equal tables, which only a fit distinguishes.
+    equal tables. Only a fit distinguishes these combinations.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -100,8 +104,9 @@ def find_sign_fits(
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
-    # If axes nearly coincide, many directions of x give nearly equal tables.
-    # For each combination of joint signs, one alignment is enough, because the fit can rotate x.
+    # If axes nearly coincide, many directions of x fit similarly.
+    # The fit can rotate x.
+    # One alignment per combination of joint signs is therefore enough.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -109,11 +114,11 @@ def find_sign_fits(
 
 
 def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
-    """Keep one of several alignments that differ only by a rotation about coinciding axes."""
+    """Drop alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # If a joint offset can be chosen freely, a change of this offset by pi reverses x.
-        # Both directions of x are then equivalent.
+        # Adding pi to a free joint offset reverses x.
+        # Opposite directions of x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.delta_in, _DECIMALS)
         different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)
@@ -121,7 +126,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 
 
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return A_k; the sign -1 rotates a joint frame by pi about its x axis."""
+    """Return A_k. A sign -1 rotates a joint frame by pi about x."""
     A = chain.constants[k]
     A = _HALF_TURN_ABOUT_X @ A if sense_before < 0 else A
     return np.array(A @ _HALF_TURN_ABOUT_X if sense_after < 0 else A)
@@ -196,12 +201,11 @@ def _possible_transforms(
         steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:
         shifted = shift_along_z(A, -delta)
-        # The axis of a prismatic joint can be moved to any parallel line.
-        # Therefore, x can have any direction if one of the two joints is prismatic.
+        # A prismatic axis can move to any parallel line.
+        # Next to a prismatic axis, x can have any direction.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # Above `NEARLY_PARALLEL`, a Hayati row needs a common normal that is farther away than the reach.
-        # The reach 0 therefore gives a Hayati row, unless the common normal passes through both origins.
+        # With reach 0, any nonzero delta gives a Hayati row.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

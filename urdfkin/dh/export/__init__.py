@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _TEXT_MODULE = "urdfkin.dh.export.text"
 #: Module and description of each format. The module contains the function `write_NAME` for a format NAME.
-#: The module name is "" if the package `urdfkin.export` writes the format.
+#: A module name "" means that `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT_MODULE, "aligned text"),
     "markdown": (_TEXT_MODULE, "a Markdown table"),
