@@ -209,7 +209,7 @@ REFUSED: list[tuple[Callable[[Robot], object], str]] = [
         r"do not broadcast: found \(2,\), \(4,\)",
     ),
     *(
-        (lambda x, frame=frame: x.jacobian(x.neutral(), frame), "a frame must be the name of a link or joint")
+        (lambda x, frame=frame: x.jacobian(x.neutral(), frame), "a frame must be a name of a link or joint")
         for frame in (3, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"]))
     ),
     (lambda x: x.placement(Z(8), {HAND}), "a list of frames must have an order, and a set has none"),  # type: ignore[arg-type]
