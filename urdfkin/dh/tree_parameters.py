@@ -42,7 +42,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.inputs import as_finite, check_range
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
@@ -151,6 +151,10 @@ class TreeParameters:
         q = as_finite(q, "q")
         if q.shape[-1:] != (len(self.coordinates),):
             raise InputError(f"q needs {len(self.coordinates)} numbers", found=f"shape {q.shape}")
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self._compute_placements(q))
+
+    def _compute_placements(self, q: FloatArray) -> FloatArray:
         values = self._values(q)
         frames = np.empty((*q.shape[:-1], len(self.rows), 4, 4))
         for j, row in enumerate(self.rows):

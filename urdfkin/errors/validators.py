@@ -79,6 +79,16 @@ def as_names(value: Any, name: str) -> tuple[str, ...]:
         raise InputError(f"{name} must be a list of names", found=safe_repr(value)) from None
 
 
+def reject_set(value: object, name: str) -> None:
+    """Raise InputError for a set, because the order of a set is random."""
+    if isinstance(value, set | frozenset):
+        raise InputError(
+            f"{name} must have an order, and a set has none",
+            found=safe_repr(value),
+            remedy="give a list or a tuple",
+        )
+
+
 def as_bool(value: object, name: str) -> bool:
     if value is True or value is False:
         return value

@@ -46,6 +46,12 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be real numbers", found=safe_repr(value)) from error
+    except RuntimeError as error:  # PyTorch raises this error for a tensor that requires a gradient.
+        raise InputError(
+            f"{name} cannot be converted to a NumPy array",
+            found=safe_repr(value),
+            remedy=str(error).partition("\n")[0],
+        ) from error
 
 
 def _is_masked(value: object) -> bool:

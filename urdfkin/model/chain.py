@@ -202,7 +202,7 @@ class FrameChain(Displayable):
         [0.0, 0.5, 0.9]
         """
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
-        return self.path.frames(values)[..., ::2, :, :]
+        return self.path.finite_frames(values)[..., ::2, :, :]
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the pose T_base_tip (..., 4, 4) for `q` (..., coordinates).

@@ -537,13 +537,17 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
         if joint.kind.nq_pinocchio > joint.kind.nq:
             own = np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
         blocks.append(check_range(own))
-    return np.concatenate(blocks, axis=-1)
+    converted = np.concatenate(blocks, axis=-1)
+    if mimic and (omitted := [i for i, joint in enumerate(tree.joints) if joint.mimic]):
+        check_turns(tree, omitted, q, from_pinocchio(tree, converted, mimic=True), tree.name)
+    return converted
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert Pinocchio's configurations to urdfkin's.
 
-    (cos, sin) of a continuous or planar joint becomes an angle in [-pi, pi].
+    (cos, sin) of a continuous or planar joint becomes an angle in [-pi, pi]. `count_turns` adds the whole
+    turns that the mimic joints show.
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
@@ -568,6 +572,14 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             mimic_joints.append((joint, tree.q_index[i], values))
         else:
             own[..., tree.q_index[i] : tree.q_index[i] + joint.kind.nq] = values
+    for joint, mimicked_at in zip(tree.joints, tree.q_index, strict=True):
+        if joint.kind is JointKind.CONTINUOUS and not joint.mimic:
+            shown = [
+                (one.mimic.multiplier, one.mimic.offset, values[..., 0], one.kind is JointKind.CONTINUOUS)
+                for one, index, values in mimic_joints
+                if one.mimic and index == mimicked_at
+            ]
+            own[..., mimicked_at] += math.tau * count_turns(own[..., mimicked_at], shown)
     for joint, mimicked_at, values in mimic_joints:
         _check_mimic_rule(joint, own[..., mimicked_at], values[..., 0])
     return own
@@ -588,13 +600,70 @@ def _angle_of_pair(joint: Joint, values: FloatArray) -> FloatArray:
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
 
+#: Largest number of turns that `count_turns` finds from cosines and sines.
+_MAX_TURNS = 16
+
+
+def count_turns(angle: FloatArray, shown: Sequence[tuple[float, float, FloatArray, bool]]) -> FloatArray:
+    """Return the whole turns that mimic joints show in addition to a continuous joint's angle (rad).
+
+    Each mimic joint has a multiplier, an offset and a value. True: the value is known only up to whole turns.
+    If the values contradict the angle, the result has no meaning.
+
+    >>> count_turns(np.array(0.5), [(0.5, 0.0, np.array(0.25 + math.pi), False)]).tolist()
+    1.0
+    """
+    if not shown:
+        return np.zeros(angle.shape)
+    for multiplier, offset, value, is_pair in shown:
+        if multiplier and not is_pair:
+            return np.rint((value - offset - multiplier * angle) / (multiplier * math.tau))
+    # The first value that fits is nearest to 0: 0, 1, -1, 2, ... turns for a negative angle.
+    turns = np.array(sorted(range(_MAX_TURNS, -_MAX_TURNS - 1, -1), key=abs), np.float64)
+    turns = np.where(angle[..., None] > 0.0, -turns, turns)
+    fits = np.ones(turns.shape, bool)
+    for multiplier, offset, value, _ in shown:
+        rest = (value - offset - multiplier * angle)[..., None] - multiplier * math.tau * turns
+        fits &= np.abs(_without_turns(rest)) <= _MIMIC_TOLERANCE
+    return np.take_along_axis(turns, fits.argmax(axis=-1)[..., None], axis=-1)[..., 0]
+
+
+def _without_turns(angle: FloatArray) -> FloatArray:
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def check_turns(
+    tree: KinematicTree, joints: Sequence[int], q: FloatArray, recovered: FloatArray, where: str
+) -> None:
+    """Raise InputError if cosines and sines lose turns that move a joint of `joints`.
+
+    `recovered` is q after the conversion to cosines and sines and back.
+    """
+    for i in joints:
+        joint, at = tree.joints[i], tree.q_index[i]
+        if not joint.kind.has_axis or not q.size:
+            continue
+        multiplier = joint.mimic.multiplier if joint.mimic else 1.0
+        lost = multiplier * (q[..., at] - recovered[..., at])
+        lost = np.abs(_without_turns(lost) if joint.kind.turns else lost)
+        allowed = _MIMIC_TOLERANCE * max(1.0, abs(multiplier)) * np.maximum(1.0, np.abs(q[..., at]))
+        if (lost > allowed).any():
+            raise InputError(
+                f"the cosine and sine of an angle lose whole turns, which move joint {joint.name}",
+                where=where,
+                found=f"a difference of {lost.max():.3g} {'rad' if joint.kind.turns else 'm'}",
+                remedy="give an angle in [-pi, pi], or load with mimic=False (--no-mimic)",
+                question=QuestionsSection.MIMIC_JOINTS,
+            )
+
+
 def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArray) -> None:
     rule = joint.mimic
     if rule is None or not values.size:
         return
     deviation = rule.multiplier * mimicked_joint + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
-        deviation = np.arctan2(np.sin(deviation), np.cos(deviation))
+        deviation = _without_turns(deviation)
     if np.abs(deviation).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
         raise InputError(
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",

@@ -247,7 +247,9 @@ def _labels(value: object) -> list[Any]:
     if hasattr(type(value), "keys"):
         labels = list(table.keys())
     else:
-        labels = list(getattr(table, "column_names", getattr(table, "columns", ())))
+        columns = getattr(table, "column_names", getattr(table, "columns", ()))
+        # In CasADi, `columns` is a method.
+        labels = [] if callable(columns) else list(columns)
     return [] if labels == list(range(len(labels))) else labels
 
 

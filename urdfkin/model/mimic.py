@@ -15,8 +15,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, QuestionsSection
-from urdfkin.kinematics.inputs import as_floats
+from urdfkin.errors import InputError, NotFiniteError, QuestionsSection
+from urdfkin.kinematics.inputs import as_floats, check_range
 from urdfkin.model.configuration import parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
@@ -75,12 +75,13 @@ class Coupling:
     def values(self, q: ConfigurationLike) -> FloatArray:
         """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
-        # Each row of G has at most one nonzero number.
-        return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
+        with np.errstate(over="ignore"):  # RangeError replaces this warning.
+            # Each row of G has at most one nonzero number.
+            return check_range(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
-            return self.layout(symbol).parse(by_name)
+            return self._check_finite(self.layout(symbol).parse(by_name), symbol)
         values = as_floats(cast("ArrayLike", array), symbol)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             names = ", ".join(self.names) or "none"
@@ -89,6 +90,13 @@ class Coupling:
                 found=f"shape {values.shape}",
                 remedy="take the path's coordinates from the robot's q, for example with select()",
             )
+        return self._check_finite(values, symbol)
+
+    def _check_finite(self, values: FloatArray, symbol: str) -> FloatArray:
+        if not np.isfinite(values).all():
+            where = tuple(np.argwhere(~np.isfinite(values))[0])
+            found = str(values[where])
+            raise NotFiniteError(f"{symbol} must be finite", where=self.names[where[-1]], found=found)
         return values
 
     @cached_property

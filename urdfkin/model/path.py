@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.model.tree import FloatArray
@@ -53,6 +54,11 @@ class Path:
     """
 
     steps: tuple[FloatArray | ElementaryMotion, ...]
+
+    def finite_frames(self, amounts: ArrayLike) -> FloatArray:
+        """Return `frames`, or raise RangeError if a result is not finite."""
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.frames(amounts))
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
         """Return the poses (..., steps, 4, 4) after each step."""

@@ -384,7 +384,7 @@ class KinematicTree:
         """
         if not isinstance(name, str):
             raise InputError(
-                "a frame must be the name of a link or joint", where=self.name, found=safe_repr(name)
+                "a frame must be a name of a link or joint", where=self.name, found=safe_repr(name)
             )
         if isinstance(name, FrameName):
             return self._frame_index(name)

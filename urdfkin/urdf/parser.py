@@ -106,6 +106,8 @@ def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     if zero >= 0:
         message = "the text contains a zero byte: some readers stop there, others continue"
         remedy = "check the file: it is not a text file, or it is damaged"
+        if text.startswith(b"PXR-USDC"):
+            message, remedy = _USD_ERROR
         report.add(NOT_UTF8, message, remedy=remedy, position=line_and_column(text, zero))
         return False
     try:
@@ -381,6 +383,8 @@ class _Builder:
                 remedy = f"close {opened} first"
             elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
                 message, remedy = "the file ends too early", f"close {opened}"
+        if self.report.data.startswith(b"#usda"):
+            message, remedy = _USD_ERROR
         found = None if reason == expat.errors.XML_ERROR_NO_ELEMENTS else self._text_at_error()
         message, position = f"not well-formed XML: {message}", (error.lineno, error.offset + 1)
         self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
@@ -397,6 +401,7 @@ class _Builder:
 
 
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
+_USD_ERROR = "this is USD, not XML", "give the path of a file with a suffix such as .usda"
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
 _TEXTS_BY_EXPAT_ERROR: dict[str, tuple[str, str | None]] = {

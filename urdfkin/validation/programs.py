@@ -8,8 +8,9 @@ Each request is one line on the program's standard input:
 
 `coordinates` contains the names of the numbers in q. The entries `v` and `a` are present if the quantity
 needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock`,
-`root_joint` and `convention` exist if the user gave values. `lock` contains the values of locked joints. The
-URDF file does not contain the values of locked joints or the root joint. The answer is one line:
+`root_joint` and `convention` exist if the user gave values. `lock` contains the values of locked joints.
+`mimic` is false if each mimic joint has its own coordinate, as with --no-mimic. The URDF file does not
+contain the values of locked joints or the root joint. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
@@ -106,6 +107,8 @@ class Program:
         }
         if robot.origin.lock:
             self._request_entries["lock"] = dict(robot.origin.lock)
+        if not robot.verifier.mimic:
+            self._request_entries["mimic"] = False
         if robot.root_joint is not None:
             self._request_entries["root_joint"] = robot.root_joint
         if convention is not None:

@@ -127,7 +127,7 @@ class Verifier:
             self.text,
             self.tree,
             self.origin.root_joint,
-            mimic=mimic,
+            mimic=mimic and self.mimic,
             lock=dict(self.origin.lock),
             lock_mimic_joints=self.mimic,
         )

@@ -35,7 +35,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
 #: Allowed deviation from a mimic rule.
-#: The unit is the target program's, times max(1, |`_TargetNumber.factor`|).
+#: The unit is the target program's, times max(1, |`_TargetNumber.factor`|, |expected value|).
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -439,6 +439,11 @@ class Conversion:
         inputs = self._parse_inputs(q, v, a)
         with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
             results = [self._to_target_q(inputs[0])]
+            if self.has_pairs and (omitted := set(range(len(self.tree.joints))) - set(self._order)):
+                recovered = self._recover_q(results[0])
+                configuration.check_turns(
+                    self.tree, sorted(omitted), inputs[0], recovered, self.convention.name
+                )
             if len(inputs) > 1:
                 results.append(self._to_target_rates(inputs[0], inputs[1]))
             if len(inputs) > 2:
@@ -518,6 +523,12 @@ class Conversion:
         return target_q
 
     def _from_target_q(self, target_q: FloatArray) -> FloatArray:
+        q = self._recover_q(target_q)
+        expected = self._to_target_q(q) if any(column.is_mimic for column in self._columns) else target_q
+        _check_mimic_numbers(self._columns, target_q, expected, "q")
+        return q
+
+    def _recover_q(self, target_q: FloatArray) -> FloatArray:
         if self._same_q:
             return target_q
         source = self._q_target_index
@@ -527,29 +538,26 @@ class Conversion:
         for at, k in enumerate(source):
             column = self._columns[k]
             if column.cos_or_sin:
-                pair = target_q[..., k : k + 2]
-                norm = np.linalg.norm(pair, axis=-1)
-                if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
-                    raise InputError(
-                        "the cosine and sine of a joint must have norm 1",
-                        where=column.name,
-                        found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
-                    )
-                angle = np.arctan2(pair[..., 1], pair[..., 0])
-                q[..., at] = (angle - column.zero) / column.factor
-        copies = [(k, column) for k, column in enumerate(self._columns) if column.is_mimic]
-        expected = self._to_target_q(q) if copies else target_q
-        for k, column in copies:
-            difference = float(np.abs(target_q[..., k] - expected[..., k]).max(initial=0.0))
-            if difference > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
-                raise InputError(
-                    "the value of a mimic joint contradicts its mimic rule",
-                    where=column.name,
-                    found=f"a difference of {difference:.3g}, in the unit of this value in the convention",
-                    remedy="correct the value, or load with mimic=False (--no-mimic)",
-                    question=QuestionsSection.MIMIC_JOINTS,
-                )
+                angle = _angle_of_pair(target_q, k, column.name) - column.zero
+                shown = self._find_shown_turns(target_q, column)
+                angle = angle + math.tau * configuration.count_turns(angle, shown)
+                q[..., at] = angle / column.factor
         return q
+
+    def _find_shown_turns(
+        self, target_q: FloatArray, source: _TargetNumber
+    ) -> list[tuple[float, float, FloatArray, bool]]:
+        """Return the arguments of `count_turns` for the mimic joints of a source column."""
+        return [
+            (
+                column.factor / source.factor,
+                column.zero,
+                _angle_of_pair(target_q, k, column.name) if column.cos_or_sin else target_q[..., k],
+                bool(column.cos_or_sin),
+            )
+            for k, column in enumerate(self._columns)
+            if column.is_mimic and column.index == source.index and column.cos_or_sin != "sin"
+        ]
 
     def _to_target_rates(
         self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
@@ -576,10 +584,9 @@ class Conversion:
         """Return M^-1 (x - M' v) for x = `target_rates`, or M^-1 x if `v` is None."""
         if self._same_v:
             return target_rates
-        rates: FloatArray = target_rates[..., self._v_target_index]
-        if self._plain_v:
-            return rates
-        rates = rates / self._v_factor[self._v_target_index]
+        rates: FloatArray = target_rates[..., self._v_target_index] / self._v_factor[self._v_target_index]
+        expected = rates[..., self._v_index] * self._v_factor
+        _check_mimic_numbers(self._rates, target_rates, expected, "v" if v is None else "a")
         for block in self._blocks:
             own = slice(block.v_index, block.v_index + block.joint.kind.nv)
             part = target_rates[..., block.target_slice]
@@ -920,6 +927,36 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
         )
         for at in range(count)
     ]
+
+
+def _angle_of_pair(target_q: FloatArray, k: int, name: str) -> FloatArray:
+    cosine, sine = target_q[..., k], target_q[..., k + 1]
+    norm = np.hypot(cosine, sine)
+    if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
+        raise InputError(
+            "the cosine and sine of a joint must have norm 1",
+            where=name,
+            found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
+        )
+    return np.arctan2(sine, cosine)
+
+
+def _check_mimic_numbers(
+    numbers: Sequence[_TargetNumber], found: FloatArray, expected: FloatArray, symbol: str
+) -> None:
+    for k, number in enumerate(numbers):
+        if not number.is_mimic:
+            continue
+        difference = np.abs(found[..., k] - expected[..., k])
+        allowed = _MIMIC_TOLERANCE * np.maximum(max(1.0, abs(number.factor)), np.abs(expected[..., k]))
+        if (difference > allowed).any():
+            raise InputError(
+                "the value of a mimic joint contradicts its mimic rule",
+                where=f"{symbol}, {number.name}",
+                found=f"a difference of {difference.max():.3g}, in the unit of this value in the convention",
+                remedy="correct the value, or load with mimic=False (--no-mimic)",
+                question=QuestionsSection.MIMIC_JOINTS,
+            )
 
 
 def _as_matrices(value: ArrayLike, name: str, *columns: int) -> FloatArray:
