@@ -31,8 +31,8 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
-#: Maximum number of frames that are also computed alone.
-#: A call for several frames must return equal results.
+#: Maximum number of frames with a second call for this frame only.
+#: The second call must return the same results.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Standard deviation of a far base's coordinates, in metres.

@@ -64,8 +64,9 @@ _JOINT_VALUE_RESOLUTION = 1e-6
 #: So an uncertain change does not make a fit implausible.
 _CHANGE_MARGIN_SIGMAS = 5.0
 #: Maximum error after a correction / original error.
-#: Second ratio: implausible fit, or `half_turn_zeros` is not empty.
-_MAX_IMPROVED_ERROR_RATIO, _MAX_SIMILAR_ERROR_RATIO = 0.25, 1.5
+_MAX_IMPROVED_ERROR_RATIO = 0.25
+#: The same ratio for a fit that is implausible or has `half_turn_zeros`.
+_MAX_SIMILAR_ERROR_RATIO = 1.5
 #: Maximum number of corrections with a fit of all parameters.
 #: The corrections with the smallest `error_before` are fitted.
 _MAX_FITS = 4

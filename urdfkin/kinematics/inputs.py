@@ -69,7 +69,7 @@ def check_range(result: FloatArray) -> FloatArray:
 
 
 def common_batch_shape(shapes: Iterable[tuple[int, ...]], what: str = "the arguments") -> tuple[int, ...]:
-    """Return the shape to which batch shapes broadcast. `what` names the arrays in the error."""
+    """Return the shape to which batch shapes broadcast. `what` names them in an error message."""
     shapes = list(shapes)
     try:
         return np.broadcast_shapes(*shapes)

@@ -333,12 +333,12 @@ ENTRY_ROUNDINGS = 2.0
 #: The unit is eps times the path length.
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
-#: Rotation 1 comes from roll, pitch, yaw: error 3.1.
-#: Rotation 2 is a product of three rotations: error 4.2.
+#: The rotation from roll, pitch and yaw has the error 3.1.
+#: The product of three rotations has the error 4.2.
 #: 0.5 (sines) + 0.5 (cosines) + 1.4 + 1.8 (multiplications) = 4.2.
 ROTATION_ROUNDINGS = 8.0
 
-#: Allowed error (in eps) of a mimicked joint's limit.
+#: Allowed rounding error (in eps) of a mimicked joint's limit.
 #: The mimic joint's limit determines the mimicked joint's limit:
 #:     `(limit of the mimic joint - offset) / multiplier`
 #: The computation has a subtraction and a division.

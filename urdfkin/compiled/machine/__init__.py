@@ -2,8 +2,8 @@
 
 Numba reads settings from `.numba_config.yaml` in the current folder. This happens during Numba's import and
 before each compilation. The file can select a cache folder. Numba executes the files of the cache. A
-malicious file could therefore run any code. With this package, Numba reads only environment variables, unless
-a program imports Numba first.
+malicious file could therefore run any code. This package imports Numba in another folder, and prevents later
+reading of the file. If a program imports Numba first, this protection fails.
 """
 
 from __future__ import annotations

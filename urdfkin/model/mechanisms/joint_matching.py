@@ -439,7 +439,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     for (axis_a, axis_b), before, after, further in firsts:
         lines = axis_a.screw, axis_b.screw
         # The axes after `axis_a` may not determine B's root pose.
-        # `more` contains axes after prismatic joints and of other branches.
+        # `more` contains further axes: after prismatic joints, and in other branches.
         # Example: the rotors of a drone.
         more = [*further, *(_with_reference_lines(lines, *pair) for pair, *_ in firsts)]
         for start in (axis_b.screw, axis_b.screw.reverse()):
