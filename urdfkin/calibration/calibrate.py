@@ -84,7 +84,9 @@ _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 _ROUNDING_FACTOR = 4.0
 #: Maximum number of parameters or poses named in a warning.
 _MAX_NAMES = 6
-_UNKNOWN_REASON = "the reason is unknown; it is not degrees, shifted rows of q or reversed joint signs"
+_UNKNOWN_REASON = (
+    "the reason is unknown: degrees, shifted rows of q or reversed joint signs do not explain the error"
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -473,7 +473,8 @@ def select_significant(
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
     Each step sets one change to 0: the change with the smallest ratio to its standard deviation. The other
-    changes are then estimated again. `always_selected` marks the parameters that are always selected. Unknown covariances are inf.
+    changes are then estimated again. `always_selected` marks the parameters that are always selected. Unknown
+    covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
