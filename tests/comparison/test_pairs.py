@@ -273,6 +273,55 @@ def test_a_common_base_and_a_common_tip_fix_the_zeros_of_prismatic_joints(common
         assert moves_alike(found, a, b)
 
 
+#: The kind, the parent link and the axis of each joint.
+MOBILE_ARM = [("planar", 0, ""), ("continuous", 1, "0 0 1"), ("revolute", 2, "0 1 0")]
+BESIDE_TWO_PLANES = [("planar", 0, ""), ("revolute", 0, "1 0 0"), ("planar", 0, "")]
+
+
+@pytest.mark.parametrize("common", [(), (1,), (2,), (3,)])
+@pytest.mark.parametrize("rows", [MOBILE_ARM, BESIDE_TWO_PLANES])
+def test_a_robot_with_planar_joints_is_found_with_few_common_links(
+    rows: list[tuple[str, int, str]], common: tuple[int, ...]
+) -> None:
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        a = built(
+            *(
+                joint(
+                    f"j{i}",
+                    kind,
+                    f"l{parent}",
+                    f"l{i + 1}",
+                    'xyz="{} {} {}"'.format(*rng.normal(size=3)),
+                    axis,
+                    limit(-1, 1) if kind == "revolute" else "",
+                )
+                for i, (kind, parent, axis) in enumerate(rows)
+            ),
+            verify=False,
+        )
+        moved = pairs.counted_elsewhere(pairs.on_a_stand(a.tree))
+        kept = {a.tree.links[i] for i in common}
+        joints = {one.name: f"other_{one.name}" for one in moved.joints}
+        links = {link: link if link in kept else f"other_{link}" for link in moved.links}
+        b = loaded(pairs.with_names(moved, joints, links))
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.SAME_AFTER, seed
+        assert moves_alike(found, a, b)
+        assert certified(found, a, b)
+
+
+def test_a_common_link_after_the_first_joint_fixes_the_base() -> None:
+    a = built(joint("j", "revolute", "base", "arm", 'xyz="0.22 0 0"', "0 1 0", limit(-1, 1)), verify=False)
+    moved = pairs.on_a_stand(a.tree)
+    links = {link: link if link == "arm" else f"other_{link}" for link in moved.links}
+    b = loaded(pairs.with_names(moved, {one.name: f"other_{one.name}" for one in moved.joints}, links))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert moves_alike(found, a, b)
+    assert certified(found, a, b)
+
+
 def test_the_zeros_of_many_joints_are_not_computed_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(matcher, "MAX_REFINED_JOINTS", 2)
     a = random_chain("RPPPRR", 0)

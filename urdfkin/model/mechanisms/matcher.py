@@ -12,6 +12,7 @@ class `_RulePair` contains the equations.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
@@ -158,6 +159,11 @@ class MechanismMatcher:
         assert best is not None
         return best
 
+    def find_exact(self) -> Alignment | None:
+        """Search an exact match from each body pair with links of equal labels."""
+        start = None if self.exact is None else self._exact_start(self.exact, self._shared_bodies())
+        return None if start is None else self._match_from(*start)
+
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
         """Yield the start of each search: two bodies, and the pose (4, 4) of B's root in A's root frame."""
         if self.choices is not None:
@@ -251,6 +257,17 @@ class MechanismMatcher:
         body_a = _find_shared_body(self.b, self.a)
         if body_a is not None:
             yield body_a, 0
+
+    def _shared_bodies(self) -> list[tuple[int, int]]:
+        """Return the body pairs with equal labels; the pair with the most equal labels comes first."""
+        bodies_b = {self.b.labels[link]: body for body, links in enumerate(self.b.bodies) for link in links}
+        shared = Counter(
+            (body, bodies_b[label])
+            for body, links in enumerate(self.a.bodies)
+            for link in links
+            if (label := self.a.labels[link]) in bodies_b
+        )
+        return [bodies for bodies, _ in shared.most_common()]
 
     def _root_poses_by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         scored = list[tuple[float, BodyPair, Score]]()
@@ -762,11 +779,9 @@ def align(
             candidate = _best_alignment(a, other, name_map, None)
             if _is_better_alignment(candidate, best):
                 best = candidate
-    return _with_zeros_by_mimic_rules(
-        _with_larger_tolerances(
-            _with_refined_axes(_with_exchanged_joints(best, name_map), name_map), name_map
-        )
-    )
+    best = _with_refined_axes(_with_exchanged_joints(best, name_map), name_map)
+    best = _with_larger_tolerances(_with_another_start(best, b, name_map), name_map)
+    return _with_zeros_by_mimic_rules(best)
 
 
 def _orders_to_try(
@@ -826,6 +841,20 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
         if _is_better_alignment(candidate, best):
             best, name_map = candidate, {**name_map, **other}
     return best
+
+
+def _with_another_start(best: Alignment, b: Mechanism, name_map: Mapping[str, str]) -> Alignment:
+    """If the alignment is not complete, search an exact match from other bodies with equal labels.
+
+    In the exact match, the joints of B have their original order.
+    """
+    if best.is_complete and best.matches_all_common_links:
+        return best
+    tolerance = tolerance_of(best.a, b)
+    joint_matcher = JointMatcher(best.a, b, name_map, tolerance)
+    matcher = MechanismMatcher(best.a, b, joint_matcher, None, LookAhead(0), tolerance, None)
+    exact = matcher.find_exact()
+    return exact if exact is not None and exact.matches_all_common_links else best
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:

@@ -296,9 +296,11 @@ class Mechanism:
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
+        """Return the joint's axis; for a planar joint, the normal of its plane."""
         if (known := self._screws.get(edge.joint)) is None:
-            T = self.zero_poses[edge.joint + 1]
-            known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
+            T, joint = self.zero_poses[edge.joint + 1], self.joint(edge)
+            axis = _Z if joint.kind is JointKind.PLANAR else joint.axis
+            known = self._screws[edge.joint] = Screw(T[:3, :3] @ axis, T[:3, 3])
         return known
 
     def reorder(self, names: Sequence[str]) -> Mechanism:
@@ -595,6 +597,11 @@ class Alignment:
         )
         matched = set(self.bodies.values())
         return any(a in self.bodies and b in matched and self.bodies[a] != b for a, b in bodies)
+
+    @property
+    def matches_all_common_links(self) -> bool:
+        matched, labels_b = {frame.a for frame in self.frames}, set(self.b.labels)
+        return all(link in matched for link, label in enumerate(self.a.labels) if label in labels_b)
 
     @property
     def has_free_frames(self) -> bool:
