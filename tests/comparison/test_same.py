@@ -656,3 +656,11 @@ def test_a_prismatic_joint_that_never_moves_is_stated_in_metres() -> None:
     found = urdfkin.same(idle("prismatic", 0.5), with_k("fixed"))
     assert found.verdict is Verdict.DIFFERS
     assert "the joint's value is always 0.5 m" in str(found.remarks[0].words)
+
+
+def test_a_recheck_repeats_the_choice_that_only_an_axis_is_displaced() -> None:
+    a = built(joint("j", "revolute", "base", "arm", 'xyz="1 0 0"', "0 1 0", limit(-1, 1)), verify=False)
+    b = pairs.loaded(pairs.bent_axis(pairs.shifted(a.tree), 0.5))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.DIFFERS
+    assert certified(found, a, b)

@@ -407,6 +407,7 @@ def _confirmation_errors(
 
 def _read_choices(document: SameCertificate) -> AlignmentChoices:
     joints, base = document["joints"], document["base_links"]
+    alone = {one["place"] for one in document["differences"] if one["detail"] == "alone"}
     return AlignmentChoices(
         (base[0], base[1]),
         np.array(document["base"]),
@@ -417,6 +418,7 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
             if (given := one["conversion"]) is not None
         },
         tuple(tuple(names) for names in document["orders"]),
+        {one["a"] for one in joints if f"joint {one['a']}" in alone},
     )
 
 

@@ -548,7 +548,12 @@ class MechanismMatcher:
         with_bodies = self._best_zero(next_pair, K @ body_pair.motion_a, screw_b, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
             alone = self._best_zero(next_pair, body_pair.motion_a, screw_b, turns, zero, depth)
-            if is_better(self._score(alone[1]), self._score(with_bodies[1])):
+            prescribed = None if self.choices is None else self.choices.alone
+            if (
+                is_better(self._score(alone[1]), self._score(with_bodies[1]))
+                if prescribed is None
+                else self.a.joint(e).name in prescribed
+            ):
                 return replace(step, offset=alone[0], axis_b=end.transform(back)), *alone[1:]
         return replace(
             step, offset=with_bodies[0], constant_motion=back @ K @ body_pair.motion_a

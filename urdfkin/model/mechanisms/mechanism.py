@@ -717,6 +717,7 @@ class AlignmentChoices:
         zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
         conversions: Conversions of planar and floating joints, by A's joint name.
         orders: Each entry lists consecutive joints of B in their new order.
+        alone: Joints of A whose axes may differ without the later bodies. None: the search decides.
     """
 
     base: tuple[str, str] | None = None
@@ -724,6 +725,7 @@ class AlignmentChoices:
     zeros: Mapping[str, tuple[int, float]] = field(default_factory=dict)
     conversions: Mapping[str, FreeJointConversion] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
+    alone: Collection[str] | None = None
 
 
 #: `AS_WRITTEN` prescribes equal root poses and equal joint coordinates for A and B.
