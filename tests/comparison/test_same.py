@@ -504,6 +504,13 @@ def test_a_certificate_with_an_unknown_joint_is_refused(compared: tuple[Robot, R
         recheck(forged, a, b)
 
 
+def test_a_distant_base_must_also_be_a_rigid_motion(compared: tuple[Robot, Robot, Any]) -> None:
+    a, b, document = compared
+    forged = copy.deepcopy(document)
+    forged["base"] = [[2.0, 0.0, 0.0, 1e12], *document["base"][1:]]
+    assert recheck(forged, a, b) == ["`base`: the matrix is not a rigid motion"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("end", ["upper", "lower"])
 def test_a_recheck_also_proves_the_distance_of_the_models_as_written(end: str) -> None:

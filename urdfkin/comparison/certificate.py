@@ -377,12 +377,8 @@ def _same_difference(
 ) -> bool:
     return (
         all(_equal(claimed[part], expected[part]) for part in ("a", "b", "detail"))
-        and math.isclose(
-            claimed["metres"], expected["metres"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[0]
-        )
-        and math.isclose(
-            claimed["radians"], expected["radians"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[1]
-        )
+        and _equal(claimed["metres"], expected["metres"], rounding[0])
+        and _equal(claimed["radians"], expected["radians"], rounding[1])
     )
 
 

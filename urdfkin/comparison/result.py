@@ -514,7 +514,8 @@ class Sameness(Displayable):
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
         For equivalent models, the link poses of A at q and of B at the result differ only by `base` and
-        `tools`. Coordinates that only B has are neutral.
+        `tools`. Coordinates that only B has are neutral. If a joint is revolute in one model and prismatic
+        in the other, its coordinate is also neutral.
 
         Raises:
             InputError: q does not have A's length, or is not finite.
@@ -532,7 +533,7 @@ class Sameness(Displayable):
                 continue
             j = tree_b.joint_index(one.b)
             theirs = tree_b.joints[j]
-            if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
+            if theirs.mimic is not None or not _have_equal_motion(joint, theirs):
                 continue
             at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
             own = q[..., at_a : at_a + n]
@@ -551,8 +552,8 @@ class Sameness(Displayable):
         models, the link poses at q and at the converted q differ only by `base` and `tools`.
 
         Raises:
-            InputError: a coordinate has no match in the other model, or the frames of a planar or floating
-                joint differ.
+            InputError: a coordinate has no match in the other model, B has no coordinates, or the frames of
+                a planar or floating joint differ.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")
@@ -568,8 +569,7 @@ class Sameness(Displayable):
             if not joint.kind.nq or joint.mimic is not None:
                 continue
             one = joints_of_b.get(joint.name)
-            kind = None if one is None else tree_a.joints[tree_a.joint_index(one.a)].kind
-            if one is None or kind is None or (kind.nq, kind.turns) != (joint.kind.nq, joint.kind.turns):
+            if one is None or not _have_equal_motion(tree_a.joints[tree_a.joint_index(one.a)], joint):
                 raise InputError(
                     "a joint of B has no matching joint in A",
                     where="map",
@@ -587,6 +587,13 @@ class Sameness(Displayable):
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
             if rule != JointRule():
                 rules[one.a] = rule
+        if not joints:
+            raise InputError(
+                "B has no coordinates, so no convention can convert to B",
+                where=self.names[1],
+                found="0 coordinates",
+                remedy="compare with a model that has moving joints",
+            )
         found = Convention(
             name=self.names[1],
             title=f"{self.sources[0]} with the joints of {self.sources[1]}",
@@ -598,6 +605,10 @@ class Sameness(Displayable):
         # The constructor raises an error if B lacks a coordinate for a joint of A.
         Conversion(tree_a, "", found)
         return found
+
+
+def _have_equal_motion(a: Joint, b: Joint) -> bool:
+    return (a.kind.nq, a.kind.turns) == (b.kind.nq, b.kind.turns)
 
 
 def length(metres: float) -> str:

@@ -193,9 +193,9 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
 
 
 def is_joint_pose(kind: JointKind, T: FloatArray) -> bool:
-    tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
-    if not is_rigid(T, tolerance):
+    if not is_rigid(T, _POSE_TOLERANCE):
         return False
+    tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
     return kind is JointKind.FLOATING or bool(np.abs(nearest_planar_pose(T) - T).max() <= tolerance)
 
 
