@@ -285,6 +285,21 @@ def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) ->
     assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
 
 
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_continuous_joint_must_not_be_mimicked_by_another_kind(kind: str) -> None:
+    text = urdfs.robot(
+        urdfs.joint("a", "continuous", "l0", "l1", more=urdfs.limit()),
+        urdfs.joint("b", kind, "l1", "l2", more=urdfs.limit() + '<mimic joint="a"/>'),
+    )
+    with pytest.raises(ValueError, match="configuration spaces have different sizes"):
+        pin.buildModelFromXML(text, mimic=True)
+    (finding,) = [one for one in check(text) if one.code == "URDF524"]
+    assert finding.remedy == 'write type="revolute" for the mimicked joint'
+    corrected = text.replace('"continuous"', '"revolute"')
+    assert not [one for one in check(corrected) if one.code == "URDF524"]
+    assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
+
+
 @pytest.mark.parametrize(
     "make",
     [

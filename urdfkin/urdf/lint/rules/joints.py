@@ -415,6 +415,11 @@ class _MimicChecker:
             both = mimicked_joint.kind == "continuous"  # Pinocchio also refuses if only the latter is.
             remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
+        elif mimicked_joint.kind == "continuous":
+            message = "Pinocchio refuses the rule (mimic=True): only the mimicked joint is continuous"
+            self.add(
+                MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimicked joint'
+            )
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
             remedy = (
