@@ -349,7 +349,7 @@ class Sameness(Displayable):
             None if `after` is empty, if no frames can be compared, or if `bounds` is False.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. If `after` is not empty, a comparison with a
-            Denavit-Hartenberg table uses only frames with equal names in A and B.
+            Denavit-Hartenberg table uses only the table's base and tip, with equal names in A and B.
         narrowed: One line for each mimicked joint with a range that violates the limits of its mimic joints.
             The distances in `frames` are computed for the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.

@@ -398,6 +398,13 @@ class Mechanism:
             edges[edge.outer].append(edge)
         return edges
 
+    @property
+    def table_tip(self) -> int | None:
+        """The child link of a table's only fixed joint, which leads to the tip; None without a table."""
+        if not self.free_frames:
+            return None
+        return next(i + 1 for i, joint in enumerate(self.tree.joints) if joint.original.kind.nv == 0)
+
     @cached_property
     def size(self) -> float:
         """Length (m) of the longest path from the root."""
