@@ -285,6 +285,16 @@ def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) ->
     assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
 
 
+def test_a_free_mimic_joint_can_have_limits_that_exclude_zero() -> None:
+    text = urdfs.robot(
+        urdfs.joint("a", "revolute", "l0", "l1", more=urdfs.limit(-1.0, 1.0)),
+        urdfs.joint("b", "revolute", "l1", "l2", more=urdfs.limit(0.5, 2.5) + urdfs.mimic("a", 1.0, 1.5)),
+    )
+    for mimic in (True, False):
+        codes = [finding.code for finding in check(text, mimic=mimic)]
+        assert ("URDF608" in codes) is not mimic
+
+
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_a_continuous_joint_must_not_be_mimicked_by_another_kind(kind: str) -> None:
     text = urdfs.robot(

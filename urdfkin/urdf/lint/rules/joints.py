@@ -540,7 +540,7 @@ _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 ]
 
 
-def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
+def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool, mimic: bool) -> None:
     """Report legal values that are probably mistakes."""
     reach = _reach(robot) if is_tree else {}
     slides = any(joint.kind in ("prismatic", "planar", "floating") for joint in robot.joints)
@@ -548,7 +548,8 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> 
     for joint in robot.joints:
         _check_angles(report, joint, reach, condition)
         _check_lengths(report, joint)
-        _check_neutral(report, joint)
+        if joint.mimic is None or not mimic:
+            _check_neutral(report, joint)
     _check_equal_joints(report, robot)
     if is_tree:
         _check_total_length(report, robot, reach)
@@ -683,7 +684,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
     limit = joint.limit
-    if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
+    if limit is None or joint.kind not in ("revolute", "prismatic"):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if lower <= upper and not lower <= 0.0 <= upper:
