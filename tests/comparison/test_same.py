@@ -671,3 +671,13 @@ def test_a_recheck_repeats_the_choice_that_only_an_axis_is_displaced() -> None:
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.DIFFERS
     assert certified(found, a, b)
+
+
+def test_a_tiny_multiplier_of_a_mimic_joint_is_no_raw_error() -> None:
+    a = built(
+        joint("a", "revolute", "l0", "l1", "", "0 0 1", limit(-1, 1)),
+        joint("b", "revolute", "l1", "l2", 'xyz="1 0 0"', "0 0 1", limit(-1, 1) + mimic("a")),
+        joint("c", "revolute", "l2", "l3", 'xyz="1 0 0"', "0 0 1", limit(-1, 1) + mimic("a", "1e-320", 1)),
+        verify=False,
+    )
+    assert urdfkin.same(a, a).verdict is Verdict.SAME

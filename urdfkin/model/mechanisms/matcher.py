@@ -978,6 +978,8 @@ class _RulePair:
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
         difference = offset - self.offset
+        if not math.isfinite(difference):  # a tiny multiplier makes `beta` overflow
+            return False
         if self.turns:
             difference = math.remainder(difference, 2.0 * math.pi)
         return self.is_free or abs(difference) <= OFFSET_TOLERANCE_FACTOR * tolerance.angle * max(
