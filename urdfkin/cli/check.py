@@ -402,6 +402,7 @@ class CheckRun:
     Attributes:
         fold: Whether many findings with the same code share a line of output; see `urdfkin.check`.
         words: The files to check, each with the argument of the command that names it.
+        _paths: The absolute path of each file; each file is checked once.
         writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
     """
@@ -417,6 +418,7 @@ class CheckRun:
     writes_baseline: bool
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
     words: dict[str, str] = field(default_factory=dict)
+    _paths: set[str] = field(default_factory=set)
     _has_changes: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
     def find_files(self, word: str, exclude: Sequence[str]) -> None:
@@ -427,7 +429,11 @@ class CheckRun:
             self.outcome.errors.append(error)
             return
         for file in files:
-            self.words.setdefault(file, word)
+            # A name such as `panda` is a robot of the catalogue, and `./panda` is a file.
+            path = file if file == Path(file).stem else str(Path(file).absolute())
+            if path not in self._paths:
+                self._paths.add(path)
+                self.words[file] = word
 
     def check_files(self) -> None:
         for file, word in self.words.items():
