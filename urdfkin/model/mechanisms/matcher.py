@@ -58,6 +58,8 @@ MAX_EXACT_SEARCH_DEPTH = 200
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of root poses that the exact search computes from axes, for each pair of start bodies.
 MAX_ROOT_POSES = 48
+#: Maximum number of body pairs with equal labels where the exact search starts.
+MAX_SHARED_BODIES = 8
 #: Of two scores with equal counts, one is better if its difference is less than this factor times the other.
 BETTER_RATIO = 0.5
 
@@ -259,7 +261,12 @@ class MechanismMatcher:
             yield body_a, 0
 
     def _shared_bodies(self) -> list[tuple[int, int]]:
-        """Return the body pairs with equal labels; the pair with the most equal labels comes first."""
+        """Return body pairs with equal labels; the pair with the most equal labels comes first.
+
+        The list is empty if a root body has a label of the other mechanism.
+        """
+        if _find_shared_body(self.a, self.b) is not None or _find_shared_body(self.b, self.a) is not None:
+            return []
         bodies_b = {self.b.labels[link]: body for body, links in enumerate(self.b.bodies) for link in links}
         shared = Counter(
             (body, bodies_b[label])
@@ -267,7 +274,7 @@ class MechanismMatcher:
             for link in links
             if (label := self.a.labels[link]) in bodies_b
         )
-        return [bodies for bodies, _ in shared.most_common()]
+        return [bodies for bodies, _ in shared.most_common(MAX_SHARED_BODIES)]
 
     def _root_poses_by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         scored = list[tuple[float, BodyPair, Score]]()
@@ -851,7 +858,8 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 def _with_another_start(best: Alignment, b: Mechanism, name_map: Mapping[str, str]) -> Alignment:
     """If the alignment is not complete, search an exact match from other bodies with equal labels.
 
-    In the exact match, the joints of B have their original order.
+    The search is slow for different robots, so `find_exact` needs roots without equal labels. In the exact
+    match, the joints of B have their original order.
     """
     if best.is_complete and best.matches_all_common_links:
         return best
