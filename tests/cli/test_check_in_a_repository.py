@@ -298,6 +298,14 @@ def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: 
     assert f"({known})" in check("--baseline", "known.json").text
 
 
+def test_a_file_with_two_spellings_is_checked_once(here: Path) -> None:
+    put("robots/arm.urdf")
+    spellings = "robots", "robots/arm.urdf", "./robots//arm.urdf", str(here / "robots/arm.urdf")
+    assert found(*spellings) == [("robots/arm.urdf", "URDF503")]
+    assert "known.json: 1 finding in" in check(*spellings, "--write-baseline", "known.json").err
+    assert check(*spellings, "--diff").text.count("@@ ") == 1
+
+
 def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_selects_the_baseline(here: Path) -> None:
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><a/>{}</joint>'
     text = f'<robot name="r"><link name="a"/><link name="b"/>{joint}</robot>'

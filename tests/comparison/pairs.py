@@ -14,6 +14,7 @@ from tests import urdfs
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Sameness
 from urdfkin.kinematics.rotation import exp_rotation, rotation_from_rpy, rpy_of
+from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, inverse
 from urdfkin.robot import Robot
 
@@ -44,12 +45,15 @@ def certified(found: Sameness, a: Robot, b: Robot) -> bool:
 def moves_alike(found: Sameness, a: Robot, b: Robot, tolerance: float = 1e-12) -> bool:
     """Return whether matched links have the predicted poses at random configurations."""
     tools = {(tool.a, tool.b): tool.pose for tool in found.tools}
-    q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
-    T_a = a.placement(q, [f"link:{ours}" for ours, _ in found.links])
-    T_a = T_a @ np.array([tools.get(pair, np.eye(4)) for pair in found.links])
-    T_b = b.placement(found.to_b(q), [base, *(f"link:{theirs}" for _, theirs in found.links)])
-    home = found.base @ b.placement(b.neutral(), base)
-    return bool(np.abs(T_a - home @ np.linalg.inv(T_b[:, :1]) @ T_b[:, 1:]).max() <= tolerance)
+    q = a.sample(5, 1)
+    poses = []
+    for k, (robot, values) in enumerate(((a, q), (b, found.to_b(q)))):
+        base = found.base_links[k]
+        T = robot.placement(values, [f"link:{name}" for name in (base, *(pair[k] for pair in found.links))])
+        home = Mechanism(robot.tree).zero_poses[robot.tree.link_index(base)]
+        poses.append(home @ np.linalg.inv(T[:, :1]) @ T[:, 1:])
+    T_a = poses[0] @ np.array([tools.get(pair, np.eye(4)) for pair in found.links])
+    return bool(np.abs(T_a - found.base @ poses[1]).max() <= tolerance)
 
 
 def branches(tree: KinematicTree) -> list[Branch]:

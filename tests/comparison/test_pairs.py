@@ -15,7 +15,7 @@ import urdfkin
 from tests import urdfs
 from tests.comparison import pairs
 from tests.comparison.pairs import certified, changed, loaded, moves_alike, robot, written
-from tests.dh.arms import disguised, elbow
+from tests.dh.arms import CONVENTIONS, disguised, elbow, with_cells
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.certificate import SAME
@@ -271,6 +271,77 @@ def test_a_common_base_and_a_common_tip_fix_the_zeros_of_prismatic_joints(common
         found = urdfkin.same(a, b, bounds=False)
         assert found.verdict is Verdict.SAME_AFTER, seed
         assert moves_alike(found, a, b)
+
+
+#: The kind, the parent link and the axis of each joint.
+MOBILE_ARM = [("planar", 0, ""), ("continuous", 1, "0 0 1"), ("revolute", 2, "0 1 0")]
+BESIDE_TWO_PLANES = [("planar", 0, ""), ("revolute", 0, "1 0 0"), ("planar", 0, "")]
+
+
+@pytest.mark.parametrize("common", [(), (1,), (2,), (3,)])
+@pytest.mark.parametrize("rows", [MOBILE_ARM, BESIDE_TWO_PLANES])
+def test_a_robot_with_planar_joints_is_found_with_few_common_links(
+    rows: list[tuple[str, int, str]], common: tuple[int, ...]
+) -> None:
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        a = built(
+            *(
+                joint(
+                    f"j{i}",
+                    kind,
+                    f"l{parent}",
+                    f"l{i + 1}",
+                    'xyz="{} {} {}"'.format(*rng.normal(size=3)),
+                    axis,
+                    limit(-1, 1) if kind == "revolute" else "",
+                )
+                for i, (kind, parent, axis) in enumerate(rows)
+            ),
+            verify=False,
+        )
+        moved = pairs.counted_elsewhere(pairs.on_a_stand(a.tree))
+        kept = {a.tree.links[i] for i in common}
+        joints = {one.name: f"other_{one.name}" for one in moved.joints}
+        links = {link: link if link in kept else f"other_{link}" for link in moved.links}
+        b = loaded(pairs.with_names(moved, joints, links))
+        found = urdfkin.same(a, b)
+        assert found.verdict is Verdict.SAME_AFTER, seed
+        assert moves_alike(found, a, b)
+        assert certified(found, a, b)
+
+
+def test_a_common_link_after_the_first_joint_fixes_the_base() -> None:
+    a = built(joint("j", "revolute", "base", "arm", 'xyz="0.22 0 0"', "0 1 0", limit(-1, 1)), verify=False)
+    moved = pairs.on_a_stand(a.tree)
+    links = {link: link if link == "arm" else f"other_{link}" for link in moved.links}
+    b = loaded(pairs.with_names(moved, {one.name: f"other_{one.name}" for one in moved.joints}, links))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert moves_alike(found, a, b)
+    assert certified(found, a, b)
+
+
+def test_within_compares_only_the_bases_and_tips_of_two_tables() -> None:
+    standard, modified = (make_dh_table(elbow(), "tip", convention=name) for name in CONVENTIONS)
+    found = urdfkin.same(standard, modified, within=1e-9)
+    assert found.as_written is not None
+    assert found.within(1e-9)
+    longer = with_cells(modified, 2, a=modified.rows[2].a + 0.1)
+    assert not urdfkin.same(standard, longer, within=0.09).within(0.09)
+    other = replace(modified, tip_frame="tool")  # the tips of two tables match
+    assert urdfkin.same(standard, other, within=1e-9).within(1e-9)
+
+
+def test_within_needs_a_frame_with_the_name_of_a_tables_tip() -> None:
+    arm = loaded(pairs.bounded(elbow()))
+    table = replace(make_dh_table(arm.tree, "tip"), tip_frame="tool")
+    longer = with_cells(table, 2, a=table.rows[2].a + 0.1)
+    for other in (table, longer):
+        for a, b in ((arm, other), (other, arm)):
+            with pytest.raises(urdfkin.InputError, match="the tip is not compared: found 'tool'"):
+                urdfkin.same(a, b, within=0.01)
+            assert not urdfkin.same(a, b).within(0.01)
 
 
 def test_the_zeros_of_many_joints_are_not_computed_together(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -504,6 +504,13 @@ def test_a_certificate_with_an_unknown_joint_is_refused(compared: tuple[Robot, R
         recheck(forged, a, b)
 
 
+def test_a_distant_base_must_also_be_a_rigid_motion(compared: tuple[Robot, Robot, Any]) -> None:
+    a, b, document = compared
+    forged = copy.deepcopy(document)
+    forged["base"] = [[2.0, 0.0, 0.0, 1e12], *document["base"][1:]]
+    assert recheck(forged, a, b) == ["`base`: the matrix is not a rigid motion"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("end", ["upper", "lower"])
 def test_a_recheck_also_proves_the_distance_of_the_models_as_written(end: str) -> None:
@@ -656,3 +663,21 @@ def test_a_prismatic_joint_that_never_moves_is_stated_in_metres() -> None:
     found = urdfkin.same(idle("prismatic", 0.5), with_k("fixed"))
     assert found.verdict is Verdict.DIFFERS
     assert "the joint's value is always 0.5 m" in str(found.remarks[0].words)
+
+
+def test_a_recheck_repeats_the_choice_that_only_an_axis_is_displaced() -> None:
+    a = built(joint("j", "revolute", "base", "arm", 'xyz="1 0 0"', "0 1 0", limit(-1, 1)), verify=False)
+    b = pairs.loaded(pairs.bent_axis(pairs.shifted(a.tree), 0.5))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.DIFFERS
+    assert certified(found, a, b)
+
+
+def test_a_tiny_multiplier_of_a_mimic_joint_is_no_raw_error() -> None:
+    a = built(
+        joint("a", "revolute", "l0", "l1", "", "0 0 1", limit(-1, 1)),
+        joint("b", "revolute", "l1", "l2", 'xyz="1 0 0"', "0 0 1", limit(-1, 1) + mimic("a")),
+        joint("c", "revolute", "l2", "l3", 'xyz="1 0 0"', "0 0 1", limit(-1, 1) + mimic("a", "1e-320", 1)),
+        verify=False,
+    )
+    assert urdfkin.same(a, a).verdict is Verdict.SAME

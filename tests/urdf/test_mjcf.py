@@ -615,7 +615,7 @@ def test_check_uses_the_options_of_loading_for_an_mjcf_file(write: Write) -> Non
     done = command("check", path, "--root-joint", "floating")
     assert (done.code, "URDF403" in done.text) == (1, True)
     done = command("check", path, "--xacro-arg", "a:=1")
-    assert (done.code, "only for robots from a .xacro file" in done.err) == (2, True)
+    assert (done.code, "--xacro-arg does nothing without a .xacro file" in done.err) == (2, True)
 
 
 def test_check_reads_mjcf_from_standard_input() -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
+from tests.cli.running import refused
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.urdf import xacro
@@ -139,6 +141,22 @@ def test_commands_and_validate_accept_xacro_arguments(arm: Path) -> None:
     report = urdfkin.validate([arm], samples=3, xacro_args={"n": 4})
     assert report.passed
     assert "--xacro-arg n:=4" in str(report.as_dict())
+
+
+def test_check_passes_xacro_arguments_only_to_xacro_files(arm: Path) -> None:
+    other = arm.with_name("other.urdf")
+    other.write_text('<robot name="r"><link name="a"/><joint name="unused" type="fixed"/></robot>')
+    done = run("check", str(other), str(arm), "--xacro-arg", "n:=6")
+    assert (done.code, "URDF" in done.text, done.err) == (1, True, "")
+
+
+def test_check_fixes_no_file_before_an_option_without_effect_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(urdfs.robot(urdfs.joint("a", "revolute", "l0", "l1", axis="0 0 2", more=urdfs.limit())))
+    text = file.read_text()
+    for option in ("--xacro-arg=n:=6", "--variant=a=b"):
+        assert "does nothing without a" in refused("check", "--fix", str(file), option)
+        assert file.read_text() == text
 
 
 # -- packages ----------------------------------------------------------------------------------------

@@ -326,9 +326,12 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
         reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
     run = _make_run(context.meta[_SETTINGS_KEY], options)
     for word in files or ["."]:
-        run.check_all(word, options["exclude"])
-    if not run.has_usd:
+        run.find_files(word, options["exclude"])
+    if not any(map(is_xacro, run.words)):
+        reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
+    if not any(map(is_usd, run.words)):
         reject_unused_options(context, ("variant", "articulation"), "without a USD file")
+    run.check_files()
     outcome = run.outcome
     if (baseline := run.finding_filter.baseline) is not None:
         outcome.known_count, outcome.obsolete_count = (
@@ -400,7 +403,8 @@ class CheckRun:
 
     Attributes:
         fold: Whether findings with one code share an output line; see `urdfkin.check`.
-        has_usd: Whether a USD file was among the files.
+        words: The files to check, each with the argument of the command that names it.
+        _paths: The absolute path of each file. Each file is checked once.
         writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
     """
@@ -414,12 +418,12 @@ class CheckRun:
     allows_unsafe_fixes: bool
     commit_files: CommitFiles | None
     writes_baseline: bool
-    has_usd: bool = False
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
-    _checked_files: set[str] = field(default_factory=set)
+    words: dict[str, str] = field(default_factory=dict)
+    _paths: set[str] = field(default_factory=set)
     _has_changes: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
-    def check_all(self, word: str, exclude: Sequence[str]) -> None:
+    def find_files(self, word: str, exclude: Sequence[str]) -> None:
         settings = self.finding_filter.settings
         try:
             files = find_files(word, settings, settings.values.get("include", DEFAULT_INCLUDE), exclude)
@@ -427,22 +431,28 @@ class CheckRun:
             self.outcome.errors.append(error)
             return
         for file in files:
-            if file not in self._checked_files:
-                self._checked_files.add(file)
-                self.has_usd = self.has_usd or is_usd(file)
-                try:
-                    # Only files on the command line may be pipes.
-                    if file not in (word, f"./{word}"):
-                        require_regular_file(Path(file))
-                    self._check(str(resolve_package_uri(file)))
-                except UrdfkinError as error:
-                    self.outcome.errors.append(error)
+            # A name such as `panda` is a robot of the catalogue, and `./panda` is a file.
+            path = file if file == Path(file).stem else str(Path(file).absolute())
+            if path not in self._paths:
+                self._paths.add(path)
+                self.words[file] = word
+
+    def check_files(self) -> None:
+        for file, word in self.words.items():
+            try:
+                # Only files on the command line may be pipes.
+                if file not in (word, f"./{word}"):
+                    require_regular_file(Path(file))
+                self._check(str(resolve_package_uri(file)))
+            except UrdfkinError as error:
+                self.outcome.errors.append(error)
 
     def _check(self, file: str) -> None:
         if _is_usd_or_mjcf(file):
             self._check_usd_or_mjcf(file)
             return
-        text = read_source(file, self.examine_text.keywords["limits"].bytes, load_options()["xacro_args"])
+        arguments = load_options()["xacro_args"] if is_xacro(file) else None
+        text = read_source(file, self.examine_text.keywords["limits"].bytes, arguments)
         if file == "-" and _is_mjcf_text(text.data):
             self._check_usd_or_mjcf(file, text)
             return
@@ -473,7 +483,7 @@ class CheckRun:
                 return
         from urdfkin.robot.loading import load
 
-        how = load_options()
+        how = {**load_options(), "xacro_args": None}
         if not is_usd(file):
             how = {name: value for name, value in how.items() if name not in ("variant", "articulation")}
         with warnings.catch_warnings():

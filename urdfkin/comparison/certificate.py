@@ -377,12 +377,8 @@ def _same_difference(
 ) -> bool:
     return (
         all(_equal(claimed[part], expected[part]) for part in ("a", "b", "detail"))
-        and math.isclose(
-            claimed["metres"], expected["metres"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[0]
-        )
-        and math.isclose(
-            claimed["radians"], expected["radians"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[1]
-        )
+        and _equal(claimed["metres"], expected["metres"], rounding[0])
+        and _equal(claimed["radians"], expected["radians"], rounding[1])
     )
 
 
@@ -407,6 +403,7 @@ def _confirmation_errors(
 
 def _read_choices(document: SameCertificate) -> AlignmentChoices:
     joints, base = document["joints"], document["base_links"]
+    alone = {one["place"] for one in document["differences"] if one["detail"] == "alone"}
     return AlignmentChoices(
         (base[0], base[1]),
         np.array(document["base"]),
@@ -417,6 +414,7 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
             if (given := one["conversion"]) is not None
         },
         tuple(tuple(names) for names in document["orders"]),
+        {one["a"] for one in joints if f"joint {one['a']}" in alone},
     )
 
 

@@ -353,8 +353,8 @@ class Sameness(Displayable):
         as_written: Interval of the matching frames that are farthest apart in the unchanged models. None if
             `after` is empty, if no frames can be compared, or if `bounds` is False.
         bound_as_written: (m, rad) proven bounds on distance and angle between matching frames of the
-            unchanged models. Infinite without a proof. For a Denavit-Hartenberg table, only frames with equal
-            names are compared if `after` is not empty.
+            unchanged models. Infinite without a proof. If `after` is not empty, a comparison with a
+            Denavit-Hartenberg table uses only the table's base and tip. Their names are equal in A and B.
         narrowed: One line for each mimicked joint that can move a mimic joint beyond limits. The distances in
             `frames` include the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
@@ -521,7 +521,8 @@ class Sameness(Displayable):
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
         Let the models be equivalent. At q (A) and at the result (B), the link poses differ only by `base` and
-        `tools`. Coordinates that only B has are neutral.
+        `tools`. Coordinates that only B has are neutral. If a joint is revolute in one model and prismatic
+        in the other, its coordinate is also neutral.
 
         Raises:
             InputError: q does not have A's length, or is not finite.
@@ -539,7 +540,7 @@ class Sameness(Displayable):
                 continue
             j = tree_b.joint_index(one.b)
             theirs = tree_b.joints[j]
-            if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
+            if theirs.mimic is not None or not _have_equal_motion(joint, theirs):
                 continue
             at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
             own = q[..., at_a : at_a + n]
@@ -558,8 +559,8 @@ class Sameness(Displayable):
         The link poses at q and at the converted q then differ only by `base` and `tools`.
 
         Raises:
-            InputError: a coordinate of A or B has no match. Also if the frames of a planar or floating joint
-                differ.
+            InputError: a coordinate has no match in the other model, or B has no coordinates. Also if the
+                frames of a planar or floating joint differ.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")
@@ -575,8 +576,7 @@ class Sameness(Displayable):
             if not joint.kind.nq or joint.mimic is not None:
                 continue
             one = joints_of_b.get(joint.name)
-            kind = None if one is None else tree_a.joints[tree_a.joint_index(one.a)].kind
-            if one is None or kind is None or (kind.nq, kind.turns) != (joint.kind.nq, joint.kind.turns):
+            if one is None or not _have_equal_motion(tree_a.joints[tree_a.joint_index(one.a)], joint):
                 raise InputError(
                     "a joint of B has no matching joint in A",
                     where="map",
@@ -594,6 +594,13 @@ class Sameness(Displayable):
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
             if rule != JointRule():
                 rules[one.a] = rule
+        if not joints:
+            raise InputError(
+                "B has no coordinates, so no convention can convert to B",
+                where=self.names[1],
+                found="0 coordinates",
+                remedy="compare with a model that has moving joints",
+            )
         found = Convention(
             name=self.names[1],
             title=f"{self.sources[0]} with the joints of {self.sources[1]}",
@@ -605,6 +612,10 @@ class Sameness(Displayable):
         # Check that each joint of A has a coordinate in B.
         Conversion(tree_a, "", found)
         return found
+
+
+def _have_equal_motion(a: Joint, b: Joint) -> bool:
+    return (a.kind.nq, a.kind.turns) == (b.kind.nq, b.kind.turns)
 
 
 def length(metres: float) -> str:

@@ -116,7 +116,7 @@ def same(
         SourceError, UnknownNameError, InputError: as for `load`.
         UnknownNameError: `map` names a joint that the model does not have.
         InputError: joints in `map` cannot be matched, or an argument is wrong. Also if a path is longer than
-            1e150 m.
+            1e150 m. With `within`, also if no frame of the other model has the name of a table's tip.
         UrdfkinError: Pinocchio finds a distance above a proven bound.
 
     Example:
@@ -209,7 +209,16 @@ class Comparator:
             moving = variables_of(written, self.tolerance)
             farthest = self._farthest_as_written(written, moving)
             bound = self._bound_as_written(written, moving, farthest)
-            if len(written.frames) < len(self._comparable_links(alignment)):
+            pairs = self._comparable_links(alignment)
+            tip = self._find_uncompared_tip(pairs)
+            if tip is not None and self.within is not None and not self._is_common(tip):
+                raise InputError(
+                    "no frame of the other model has the name of the table's tip, so the tip is not compared",
+                    where="--within",
+                    found=repr(tip),
+                    remedy="write the name of the other model's frame as the table's tip",
+                )
+            if len(written.frames) < len(pairs) or tip is not None:
                 bound = math.inf, math.inf
         checked = self._confirm(alignment, variables, [frame.upper for frame in frames])
         return replace(
@@ -362,9 +371,28 @@ class Comparator:
     def _comparable_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
+        if not alignment.has_free_frames:
+            return list(pairs)
         # A table's frame poses depend on the Denavit-Hartenberg convention.
-        # So a table is compared by links of equal names.
-        return [(a, b) for a, b in pairs if not alignment.has_free_frames or links[0][a] == links[1][b]]
+        # So only the table's base and tip are compared.
+        tips = alignment.a.table_tip, alignment.b.table_tip
+        return [
+            (a, b)
+            for a, b in pairs
+            if (links[0][a] == links[1][b] or (a, b) == tips)
+            and all(tip is None or link in (0, tip) for link, tip in zip((a, b), tips, strict=True))
+        ]
+
+    def _is_common(self, link: str) -> bool:
+        return all(link in tree.links for tree in self.trees)
+
+    def _find_uncompared_tip(self, pairs: Sequence[tuple[int, int]]) -> str | None:
+        """Return the name of a table's tip that is in no pair."""
+        for k, mechanism in enumerate(self.mechanisms):
+            tip = mechanism.table_tip
+            if tip is not None and all(pair[k] != tip for pair in pairs):
+                return self.trees[k].links[tip]
+        return None
 
     def _check_map(self, alignment: Alignment) -> None:
         names = alignment.names

@@ -660,6 +660,9 @@ def test_a_coordinate_of_only_one_model_is_an_error_that_names_the_joint() -> No
         urdfkin.same(shorter, b, bounds=False).convention()
     with pytest.raises(InputError, match=r"the order of joints lacks a joint.*found b"):
         urdfkin.same(a, shorter, bounds=False).convention()
+    rigid = built(joint("j", "fixed", "base", "tip"), verify=False)
+    with pytest.raises(InputError, match=r"B has no coordinates.*: found 0 coordinates; compare with"):
+        urdfkin.same(rigid, rigid, bounds=False).convention()
 
 
 def test_no_convention_converts_an_angle_to_a_length() -> None:
@@ -669,6 +672,7 @@ def test_no_convention_converts_an_angle_to_a_length() -> None:
     )
     with pytest.raises(InputError, match=r"a joint of B has no matching joint in A.*found b"):
         urdfkin.same(a, sliding, bounds=False).convention()
+    assert urdfkin.same(a, sliding, bounds=False).to_b([0.1, 0.2]).tolist() == [0.1, 0.0]
 
 
 def test_a_floating_joint_with_different_frames_in_two_models_is_an_error() -> None:

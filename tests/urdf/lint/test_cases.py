@@ -285,6 +285,31 @@ def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) ->
     assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
 
 
+def test_a_free_mimic_joint_can_have_limits_that_exclude_zero() -> None:
+    text = urdfs.robot(
+        urdfs.joint("a", "revolute", "l0", "l1", more=urdfs.limit(-1.0, 1.0)),
+        urdfs.joint("b", "revolute", "l1", "l2", more=urdfs.limit(0.5, 2.5) + urdfs.mimic("a", 1.0, 1.5)),
+    )
+    for mimic in (True, False):
+        codes = [finding.code for finding in check(text, mimic=mimic)]
+        assert ("URDF608" in codes) is not mimic
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_continuous_joint_must_not_be_mimicked_by_another_kind(kind: str) -> None:
+    text = urdfs.robot(
+        urdfs.joint("a", "continuous", "l0", "l1", more=urdfs.limit()),
+        urdfs.joint("b", kind, "l1", "l2", more=urdfs.limit() + '<mimic joint="a"/>'),
+    )
+    with pytest.raises(ValueError, match="configuration spaces have different sizes"):
+        pin.buildModelFromXML(text, mimic=True)
+    (finding,) = [one for one in check(text) if one.code == "URDF524"]
+    assert finding.remedy == 'write type="revolute" for the mimicked joint'
+    corrected = text.replace('"continuous"', '"revolute"')
+    assert not [one for one in check(corrected) if one.code == "URDF524"]
+    assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
+
+
 @pytest.mark.parametrize(
     "make",
     [

@@ -144,7 +144,7 @@ class JointMatcher:
                 for f in self.b.edges_by_body[bodies[1]]
             )
             for e in self.a.edges_by_body[bodies[0]]
-            if self.a.joint(e).kind.has_axis
+            if _has_direction(self.a, e)
         )
 
     def rank_candidates(
@@ -217,8 +217,6 @@ class JointMatcher:
         kind = motion_type(self.a.joint(e).kind)
         if kind != motion_type(self.b.joint(f).kind):
             return 0.0, 0.0
-        if kind == "planar":
-            return _JointGeometry.of(self.a, e, motion_a).mismatch(_JointGeometry.of(self.b, f, motion_b))
         return _line_difference(
             kind, self.a.screw(e).transform(motion_a), self.b.screw(f).transform(motion_b)
         )
@@ -230,20 +228,14 @@ class _JointGeometry:
     subtree_shape: str
     screw: Screw
     origin: list[float]
-    normal: FloatArray
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, subtree_shape: str = "") -> _JointGeometry:
         pose = T @ mechanism.zero_poses[edge.joint + 1]
         screw = mechanism.screw(edge).transform(T)
-        return cls(
-            motion_type(mechanism.joint(edge).kind), subtree_shape, screw, pose[:3, 3].tolist(), pose[:3, 2]
-        )
+        return cls(motion_type(mechanism.joint(edge).kind), subtree_shape, screw, pose[:3, 3].tolist())
 
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
-        if self.kind == "planar":
-            normals = (Screw(one.normal, one.normal) for one in (self, other))
-            return line_difference(*normals, with_distance=False)
         return _line_difference(self.kind, self.screw, other.screw)
 
 
@@ -268,9 +260,11 @@ class Axis:
     screw: Screw
     turns: bool
     reference_line: Screw
+    #: Whether a planar joint can rotate the axis about the reference line.
+    behind_plane: bool = False
 
     def transform(self, T: FloatArray) -> Axis:
-        return Axis(self.screw.transform(T), self.turns, self.reference_line.transform(T))
+        return replace(self, screw=self.screw.transform(T), reference_line=self.reference_line.transform(T))
 
     def nearest_point_coordinate(self, u: FloatArray) -> float | None:
         """Return the coordinate along u (m) of the reference line's nearest point.
@@ -300,6 +294,8 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
         if coordinates[0] is not None and coordinates[1] is not None:
             yield coordinates[0] - coordinates[1]
         return
+    if axis_a.behind_plane:
+        return
     s, t = axis_a.screw, axis_b.screw
     candidate = angle_from_to(u.direction, t.direction, s.direction)
     if candidate is not None:
@@ -327,19 +323,25 @@ def later_axes(
     reference_line: Both[Screw],
     *,
     past_prismatic: bool = False,
+    behind_plane: bool = False,
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes of A and B after the joints `via`.
 
     A branch ends at the first axis not nearly parallel to `reference_line[0]`. Nearly parallel axes determine
-    zero offsets inexactly. With `past_prismatic`, a branch does not end at a prismatic axis. A prismatic axis
-    has no position.
+    zero offsets inexactly. With `past_prismatic`, a branch ends only at a revolute axis. A prismatic axis has
+    no position. Behind a planar joint, the axes determine only heights above its plane.
     """
+    behind_plane |= via[0] is not None and _motion_type(mechanisms[0], via[0]) == "planar"
     for e, f in _next_joints(mechanisms, via, bodies):
-        axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
+        axes = (
+            replace(_axis(mechanisms[0], e, reference_line[0]), behind_plane=behind_plane),
+            replace(_axis(mechanisms[1], f, reference_line[1]), behind_plane=behind_plane),
+        )
         yield axes
         screws = axes[0].screw, axes[1].screw
         sine = np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction))
-        if sine < _NEARLY_PARALLEL_SINE or (past_prismatic and not axes[0].turns):
+        passes = past_prismatic and _motion_type(mechanisms[0], e) == "prismatic"
+        if sine < _NEARLY_PARALLEL_SINE or passes:
             next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
             yield from later_axes(
                 mechanisms,
@@ -347,6 +349,7 @@ def later_axes(
                 next_bodies,
                 screws if axes[0].turns else reference_line,
                 past_prismatic=past_prismatic,
+                behind_plane=behind_plane,
             )
 
 
@@ -491,7 +494,7 @@ def root_poses_by_siblings(
             ]
             # The axis of a prismatic joint has no position.
             # Axes after the joint can determine the shift along u.
-            if not axes_a[second].turns:
+            if _motion_type(a, edges[second]) == "prismatic":
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 next_joints = _next_joints((a, b), (edges[second], g), carried)
                 other_pairs += [with_lines(_axis(a, e), _axis(b, h)) for e, h in next_joints]
@@ -508,7 +511,7 @@ def _with_reference_lines(lines: Both[Screw], axis_a: Axis, axis_b: Axis) -> Bot
 
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
-    return [edge for edge in mechanism.edges_by_body[body] if mechanism.joint(edge).kind.has_axis]
+    return [edge for edge in mechanism.edges_by_body[body] if _has_direction(mechanism, edge)]
 
 
 def _candidates(
@@ -546,7 +549,7 @@ def _first_revolute_axes(
         lines = pair[0].screw, pair[1].screw
         deeper = (
             []
-            if pair[0].turns
+            if _motion_type(mechanisms[0], e) != "prismatic"
             else _first_revolute_axes(mechanisms, (e, f), next_bodies, (*earlier_pairs, pair))
         )
         after = partial(later_axes, mechanisms, (e, f), next_bodies, lines)
@@ -558,16 +561,21 @@ def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
     edges_a, edges_b = (
-        [
-            edge
-            for edge in mechanism.edges_by_body[body]
-            if edge is not by and mechanism.joint(edge).kind.has_axis
-        ]
+        [edge for edge in mechanism.edges_by_body[body] if edge is not by and _has_direction(mechanism, edge)]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
     )
     for e, f in product(edges_a, edges_b):
-        if _axis(mechanisms[0], e).turns is _axis(mechanisms[1], f).turns:
+        if _motion_type(mechanisms[0], e) == _motion_type(mechanisms[1], f):
             yield e, f
+
+
+def _motion_type(mechanism: Mechanism, edge: Edge) -> str:
+    return motion_type(mechanism.joint(edge).kind)
+
+
+def _has_direction(mechanism: Mechanism, edge: Edge) -> bool:
+    """Return whether a joint has an axis, or a plane with a normal."""
+    return _motion_type(mechanism, edge) in ("turns", "prismatic", "planar")
 
 
 def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None) -> Axis:

@@ -13,6 +13,7 @@ a joint. The class `_RulePair` contains the equations.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
@@ -60,6 +61,9 @@ LOOK_AHEAD_DEPTH = 6
 #: Maximum number of root poses that axes give the exact search.
 #: The maximum applies to each pair of bodies.
 MAX_ROOT_POSES = 48
+#: Maximum number of start body pairs for the exact search.
+#: The two bodies of a pair have equal labels.
+MAX_SHARED_BODIES = 8
 #: A score is better if `difference < BETTER_RATIO * other_difference`.
 #: The rule applies to scores with equal counts.
 BETTER_RATIO = 0.5
@@ -164,6 +168,11 @@ class MechanismMatcher:
         assert best is not None
         return best
 
+    def find_exact(self) -> Alignment | None:
+        """Search an exact match from each body pair with links of equal labels."""
+        start = None if self.exact is None else self._exact_start(self.exact, self._shared_bodies())
+        return None if start is None else self._match_from(*start)
+
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
         """Yield start bodies, and B's root pose (4, 4) in A's root frame."""
         if self.choices is not None:
@@ -258,6 +267,22 @@ class MechanismMatcher:
         body_a = _find_shared_body(self.b, self.a)
         if body_a is not None:
             yield body_a, 0
+
+    def _shared_bodies(self) -> list[tuple[int, int]]:
+        """Return body pairs with equal labels; the pair with the most equal labels comes first.
+
+        The list is empty if a root body has a label of the other mechanism.
+        """
+        if _find_shared_body(self.a, self.b) is not None or _find_shared_body(self.b, self.a) is not None:
+            return []
+        bodies_b = {self.b.labels[link]: body for body, links in enumerate(self.b.bodies) for link in links}
+        shared = Counter(
+            (body, bodies_b[label])
+            for body, links in enumerate(self.a.bodies)
+            for link in links
+            if (label := self.a.labels[link]) in bodies_b
+        )
+        return [bodies for bodies, _ in shared.most_common(MAX_SHARED_BODIES)]
 
     def _root_poses_by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         scored = list[tuple[float, BodyPair, Score]]()
@@ -542,7 +567,12 @@ class MechanismMatcher:
         with_bodies = self._best_zero(next_pair, K @ body_pair.motion_a, screw_b, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
             alone = self._best_zero(next_pair, body_pair.motion_a, screw_b, turns, zero, depth)
-            if is_better(self._score(alone[1]), self._score(with_bodies[1])):
+            prescribed = None if self.choices is None else self.choices.alone
+            if (
+                is_better(self._score(alone[1]), self._score(with_bodies[1]))
+                if prescribed is None
+                else self.a.joint(e).name in prescribed
+            ):
                 return replace(step, offset=alone[0], axis_b=end.transform(back)), *alone[1:]
         return replace(
             step, offset=with_bodies[0], constant_motion=back @ K @ body_pair.motion_a
@@ -778,11 +808,9 @@ def align(
             candidate = _best_alignment(a, other, name_map, None)
             if _is_better_alignment(candidate, best):
                 best = candidate
-    return _with_zeros_by_mimic_rules(
-        _with_larger_tolerances(
-            _with_refined_axes(_with_exchanged_joints(best, name_map), name_map), name_map
-        )
-    )
+    best = _with_refined_axes(_with_exchanged_joints(best, name_map), name_map)
+    best = _with_larger_tolerances(_with_another_start(best, b, name_map), name_map)
+    return _with_zeros_by_mimic_rules(best)
 
 
 def _orders_to_try(
@@ -845,6 +873,21 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
         if _is_better_alignment(candidate, best):
             best, name_map = candidate, {**name_map, **other}
     return best
+
+
+def _with_another_start(best: Alignment, b: Mechanism, name_map: Mapping[str, str]) -> Alignment:
+    """If the alignment is not complete, search an exact match from other bodies with equal labels.
+
+    The search is slow for different robots, so `find_exact` needs roots without equal labels. In the exact
+    match, the joints of B have their original order.
+    """
+    if best.is_complete and best.matches_all_common_links:
+        return best
+    tolerance = tolerance_of(best.a, b)
+    joint_matcher = JointMatcher(best.a, b, name_map, tolerance)
+    matcher = MechanismMatcher(best.a, b, joint_matcher, None, LookAhead(0), tolerance, None)
+    exact = matcher.find_exact()
+    return exact if exact is not None and exact.matches_all_common_links else best
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
@@ -971,6 +1014,8 @@ class _RulePair:
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
         difference = offset - self.offset
+        if not math.isfinite(difference):  # a tiny multiplier makes `beta` overflow
+            return False
         if self.turns:
             difference = math.remainder(difference, 2.0 * math.pi)
         return self.is_free or abs(difference) <= OFFSET_TOLERANCE_FACTOR * tolerance.angle * max(

@@ -217,9 +217,9 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
 
 
 def is_joint_pose(kind: JointKind, T: FloatArray) -> bool:
-    tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
-    if not is_rigid(T, tolerance):
+    if not is_rigid(T, _POSE_TOLERANCE):
         return False
+    tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
     return kind is JointKind.FLOATING or bool(np.abs(nearest_planar_pose(T) - T).max() <= tolerance)
 
 
@@ -320,9 +320,11 @@ class Mechanism:
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
+        """Return the joint's axis; for a planar joint, the normal of its plane."""
         if (known := self._screws.get(edge.joint)) is None:
-            T = self.zero_poses[edge.joint + 1]
-            known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
+            T, joint = self.zero_poses[edge.joint + 1], self.joint(edge)
+            axis = _Z if joint.kind is JointKind.PLANAR else joint.axis
+            known = self._screws[edge.joint] = Screw(T[:3, :3] @ axis, T[:3, 3])
         return known
 
     def reorder(self, names: Sequence[str]) -> Mechanism:
@@ -420,6 +422,13 @@ class Mechanism:
             edges[edge.inner].append(edge)
             edges[edge.outer].append(edge)
         return edges
+
+    @property
+    def table_tip(self) -> int | None:
+        """The child link of a table's only fixed joint, which leads to the tip; None without a table."""
+        if not self.free_frames:
+            return None
+        return next(i + 1 for i, joint in enumerate(self.tree.joints) if joint.original.kind.nv == 0)
 
     @cached_property
     def size(self) -> float:
@@ -622,6 +631,11 @@ class Alignment:
         return any(a in self.bodies and b in matched and self.bodies[a] != b for a, b in bodies)
 
     @property
+    def matches_all_common_links(self) -> bool:
+        matched, labels_b = {frame.a for frame in self.frames}, set(self.b.labels)
+        return all(link in matched for link, label in enumerate(self.a.labels) if label in labels_b)
+
+    @property
     def has_free_frames(self) -> bool:
         """Whether a convention chooses the link frames of A or B."""
         return self.a.free_frames or self.b.free_frames
@@ -735,6 +749,7 @@ class AlignmentChoices:
         zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
         conversions: Conversions of planar and floating joints, by A's joint name.
         orders: Each entry lists consecutive joints of B in their new order.
+        alone: Joints of A whose axes may differ without the later bodies. None: the search decides.
     """
 
     base: tuple[str, str] | None = None
@@ -742,6 +757,7 @@ class AlignmentChoices:
     zeros: Mapping[str, tuple[int, float]] = field(default_factory=dict)
     conversions: Mapping[str, FreeJointConversion] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
+    alone: Collection[str] | None = None
 
 
 #: `AS_WRITTEN` prescribes equal root poses and equal joint coordinates.

@@ -166,7 +166,7 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     check_axes(report, robot)
     check_ranges(report, robot)
     check_mimic(report, robot, enabled=mimic)
-    check_suspicious(report, robot, is_tree=is_tree)
+    check_suspicious(report, robot, is_tree=is_tree, mimic=mimic)
     check_inertials(report, robot)
     check_shapes(report, robot)
     check_materials(report, robot)

@@ -422,6 +422,11 @@ class _MimicChecker:
             both = mimicked_joint.kind == "continuous"
             remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
+        elif mimicked_joint.kind == "continuous":
+            message = "Pinocchio refuses the rule (mimic=True): only the mimicked joint is continuous"
+            self.add(
+                MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimicked joint'
+            )
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
             remedy = "name a joint that is not a mimic joint; some readers apply only one rule"
@@ -548,7 +553,7 @@ _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 ]
 
 
-def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
+def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool, mimic: bool) -> None:
     """Report legal values that are probably mistakes."""
     reach = _reach(robot) if is_tree else {}
     slides = any(joint.kind in ("prismatic", "planar", "floating") for joint in robot.joints)
@@ -556,7 +561,8 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> 
     for joint in robot.joints:
         _check_angles(report, joint, reach, condition)
         _check_lengths(report, joint)
-        _check_neutral(report, joint)
+        if joint.mimic is None or not mimic:
+            _check_neutral(report, joint)
     _check_equal_joints(report, robot)
     if is_tree:
         _check_total_length(report, robot, reach)
@@ -691,7 +697,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
     limit = joint.limit
-    if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
+    if limit is None or joint.kind not in ("revolute", "prismatic"):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if lower <= upper and not lower <= 0.0 <= upper:
