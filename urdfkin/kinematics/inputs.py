@@ -71,6 +71,32 @@ def common_batch_shape(shapes: Iterable[tuple[int, ...]], what: str = "the argum
         raise InputError(f"the batch shapes of {what} do not broadcast", found=found) from None
 
 
+def as_sample_index(sample: object, batch_shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the indices of a sample in a batch.
+
+    >>> as_sample_index([1], (3,))
+    (1,)
+    """
+    exists = isinstance(sample, tuple | list) and len(sample) == len(batch_shape)
+    if exists and all(isinstance(i, int | np.integer) and not isinstance(i, bool) for i in sample):
+        index = tuple(int(i) for i in sample)
+        if all(-n <= i < n for i, n in zip(index, batch_shape, strict=True)):
+            return index
+    raise InputError(
+        "no such configuration", found=safe_repr(sample), where=f"a batch of shape {batch_shape}"
+    )
+
+
+def as_rows(rows: object) -> slice:
+    """Return `rows` if it is a slice of whole numbers."""
+    try:
+        if isinstance(rows, slice) and rows.indices(6):
+            return rows
+    except (TypeError, ValueError):
+        pass
+    raise InputError("rows must be a slice", found=safe_repr(rows), remedy="write slice(0, 3)")
+
+
 def as_finite(value: ArrayLike, name: str) -> FloatArray:
     array = as_floats(value, name)
     if not np.isfinite(array).all():

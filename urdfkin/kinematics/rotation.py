@@ -53,7 +53,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
-from urdfkin.errors.validators import as_str
+from urdfkin.errors.validators import as_finite_float, as_str, safe_repr
 from urdfkin.kinematics.inputs import (
     FloatArray,
     as_finite,
@@ -79,7 +79,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
     Raise InputError if |S + S^T| / 2 > tolerance * |S|, where |.| is the largest absolute entry.
     """
-    S = as_matrices(S, "S")
+    S, tolerance = as_matrices(S, "S"), as_finite_float(tolerance, "tolerance")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
     symmetric = np.abs(S + S.swapaxes(-1, -2)).max(axis=(-1, -2), initial=0.0) / 2.0
     if (symmetric > tolerance * size).any():
@@ -262,7 +262,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     For the fixed frame, E is `1/2 [q0 I - S(q); -q^T]`. For the body frame, E is `1/2 [q0 I + S(q); -q^T]`.
     In both cases, `E^T E = I/4` and `E^T (q, q0) = 0`.
     """
-    if frame not in ("fixed", "body"):
+    if as_str(frame, "frame") not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
     quat = normalise_quaternions(quat)
     q, q0 = quat[..., :3], quat[..., 3]
@@ -296,6 +296,8 @@ def integrate_orientation(
     (rad/s), expressed in `frame`. Each jump of `w` must be at one of the `times`. The steps evaluate `w` only
     between the `times`.
     """
+    if not callable(w):
+        raise InputError("w must be a function of the time", found=safe_repr(w))
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
         found = f"shape {times.shape}"
@@ -627,7 +629,7 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def _refuse_singular(name: str, angles: FloatArray, nearest: float) -> None:
-    distance = singularity_distance(name, angles)
+    distance, nearest = singularity_distance(name, angles), as_finite_float(nearest, "nearest")
     if distance.size and distance.min() <= nearest:
         sample = np.unravel_index(distance.argmin(), distance.shape)
         raise RepresentationSingularityError(name, float(distance.min()), tuple(int(i) for i in sample))

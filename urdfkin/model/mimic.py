@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, QuestionsSection
-from urdfkin.kinematics.inputs import as_floats
+from urdfkin.kinematics.inputs import as_finite
 from urdfkin.model.configuration import parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
@@ -81,8 +81,8 @@ class Coupling:
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
-            return self.layout(symbol).parse(by_name)
-        values = as_floats(cast("ArrayLike", array), symbol)
+            return as_finite(self.layout(symbol).parse(by_name), symbol)
+        values = as_finite(cast("ArrayLike", array), symbol)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             names = ", ".join(self.names) or "none"
             raise InputError(

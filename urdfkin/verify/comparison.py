@@ -79,7 +79,8 @@ def bound_ratios(units: FloatArray, k: FloatArray) -> FloatArray:
 
     The ratio is inf if the bound is invalid (k is NaN).
     """
-    return np.where(np.isnan(k), np.inf, units / k)
+    with np.errstate(over="ignore"):  # The result is then inf.
+        return np.where(np.isnan(k), np.inf, units / k)
 
 
 @np.errstate(all="ignore")

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
-from urdfkin.errors.validators import safe_repr
+from urdfkin.errors.validators import as_int, as_str, safe_repr
 from urdfkin.kinematics.inputs import as_finite, as_floats, check_range, common_batch_shape
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
@@ -357,6 +357,8 @@ class Conversion:
 
     def layout(self, symbol: str) -> CoordinateLayout:
         """Return names and units of the target program's "q", "v" or "a"."""
+        if as_str(symbol, "symbol") not in ("q", "v", "a"):
+            raise UnknownNameError("symbol", symbol, "qva")
         if symbol != "q":
             rest = {"neutral": np.zeros(self.nv)}
             units = tuple(rate.unit for rate in self._rates)
@@ -467,7 +469,7 @@ class Conversion:
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
         given = zip((q, v, a), "qva", strict=True)
-        inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
+        inputs = [self._check_target(x, symbol) for x, symbol in given if symbol == "q" or x is not None]
         common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         with np.errstate(over="ignore", invalid="ignore"):
             results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
@@ -482,7 +484,9 @@ class Conversion:
         if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", values, strict=True)
-        inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
+        # Only v and a are optional.
+        given = [(letter, x) for letter, x in letters if letter == "q" or x is not None]
+        inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in given]
         common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         return inputs
 
@@ -621,8 +625,9 @@ class Conversion:
         Returns:
             (..., program's nv, nv) matrix.
         """
-        configurations, velocities = self._parse_inputs(q, v, None)
-        shape = np.broadcast_shapes(configurations.shape[:-1], velocities.shape[:-1])
+        configurations = configuration.parse_finite(self.tree, q, "q")
+        velocities = configuration.parse_finite(self.tree, v, "v")
+        shape = common_batch_shape((configurations.shape[:-1], velocities.shape[:-1]), "q and v")
         M_rate = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
             own = slice(block.v_index, block.v_index + block.joint.kind.nv)
@@ -696,6 +701,7 @@ class Conversion:
         [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
         """
         array = as_floats(x, "six-vectors")
+        axis = as_int(axis, "axis", -max(1, array.ndim), max(1, array.ndim) - 1)
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
         return np.take(array, _ANGULAR_FIRST, axis) if self.angular_first else array
