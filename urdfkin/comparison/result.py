@@ -251,7 +251,7 @@ class JointDifference:
         return f"{self.place}: {self.what} {self.b}{old}".replace("  ", " ") + explained
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tool:
     """Two matched links that `same` reports as different tools.
 

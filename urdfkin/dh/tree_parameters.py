@@ -80,7 +80,7 @@ class TreeRow:
     offset: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TreeParameters:
     """The table of a whole robot.
 

@@ -58,7 +58,7 @@ class ChainJoint:
     mimic: Mimic | None = None
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class FrameChain(Displayable):
     """The moving joints from base to tip, and the constant poses between them.
 

@@ -16,8 +16,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, QuestionsSection
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.errors import InputError, NotFiniteError, QuestionsSection
+from urdfkin.kinematics.inputs import as_floats
 from urdfkin.model.configuration import parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
@@ -81,14 +81,20 @@ class Coupling:
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
-            return as_finite(self.layout(symbol).parse(by_name), symbol)
-        values = as_finite(cast("ArrayLike", array), symbol)
+            values = self.layout(symbol).parse(by_name)
+        else:
+            values = as_floats(cast("ArrayLike", array), symbol)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             names = ", ".join(self.names) or "none"
             raise InputError(
                 f"{symbol} needs {len(self.names)} values on its last axis: {names}",
                 found=f"shape {values.shape}",
                 remedy="take the path's coordinates from the robot's q, for example with select()",
+            )
+        if not np.isfinite(values).all():
+            where = tuple(np.argwhere(~np.isfinite(values))[0])
+            raise NotFiniteError(
+                f"{symbol} must be finite", where=self.names[where[-1]], found=str(values[where])
             )
         return values
 

@@ -66,7 +66,7 @@ class FunctionError:
     message: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WorstResult:
     """The result with the largest ratio of difference to bound.
 
