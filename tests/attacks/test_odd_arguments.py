@@ -280,7 +280,8 @@ def test_a_conversion_without_q_is_refused() -> None:
 
 def test_rows_of_a_frame_motion_must_be_a_slice(robot: Robot) -> None:
     motion = urdfkin.frame_motion(robot, [[[0.1, 0.2]]] * 3, "c")
-    for rows in (2, None, True, [0, 1], slice("a", None)):
+    wrong: list[Any] = [2, None, True, [0, 1], slice("a", None)]
+    for rows in wrong:
         for method in (motion.manipulability, motion.singular_values_of):
             with pytest.raises(urdfkin.InputError, match="rows must be a slice"):
                 method(rows)
@@ -310,7 +311,7 @@ def test_a_lock_with_a_missing_robot_does_not_end_a_validation(value: Any, shown
 
 def test_equal_paths_and_tables_can_be_compared_and_hashed(robot: Robot) -> None:
     for make in (robot.chain, robot.tree_parameters, robot.dh, robot.screws):
-        first, second = make(), make()  # type: ignore[operator]
+        first, second = make(), make()
         assert first == first  # noqa: PLR0124
         assert first != second
         assert hash(first) != hash(second)

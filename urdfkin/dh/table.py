@@ -110,7 +110,7 @@ class DHRow:
             object.__setattr__(self, name, number)
         if not is_real(self.sense) or float_or_infinity(self.sense) not in (1.0, -1.0):
             raise InputError("`sense` must be +1 or -1", where=where, found=safe_repr(self.sense))
-        object.__setattr__(self, "sense", int(self.sense))
+        object.__setattr__(self, "sense", int(float_or_infinity(self.sense)))
         if not isinstance(self.kind, JointKind) or not self.kind.has_axis:
             raise InputError(
                 "the joint of a row must be revolute, continuous or prismatic",

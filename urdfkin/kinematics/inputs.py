@@ -77,11 +77,10 @@ def as_sample_index(sample: object, batch_shape: tuple[int, ...]) -> tuple[int, 
     >>> as_sample_index([1], (3,))
     (1,)
     """
-    exists = isinstance(sample, tuple | list) and len(sample) == len(batch_shape)
-    if exists and all(isinstance(i, int | np.integer) and not isinstance(i, bool) for i in sample):
-        index = tuple(int(i) for i in sample)
-        if all(-n <= i < n for i, n in zip(index, batch_shape, strict=True)):
-            return index
+    if isinstance(sample, tuple | list) and len(sample) == len(batch_shape):
+        are_integers = all(isinstance(i, int | np.integer) and not isinstance(i, bool) for i in sample)
+        if are_integers and all(-n <= i < n for i, n in zip(sample, batch_shape, strict=True)):
+            return tuple(map(int, sample))
     raise InputError(
         "no such configuration", found=safe_repr(sample), where=f"a batch of shape {batch_shape}"
     )

@@ -468,8 +468,8 @@ class Conversion:
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
-        given = zip((q, v, a), "qva", strict=True)
-        inputs = [self._check_target(x, symbol) for x, symbol in given if symbol == "q" or x is not None]
+        inputs = [self._check_target(q, "q")]
+        inputs += [self._check_target(x, symbol) for symbol, x in (("v", v), ("a", a)) if x is not None]
         common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         with np.errstate(over="ignore", invalid="ignore"):
             results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
@@ -480,13 +480,14 @@ class Conversion:
         results = list(map(check_range, results))
         return results[0] if len(results) == 1 else tuple(results)
 
-    def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
-        if values[1] is None and values[2] is not None:
+    def _parse_inputs(
+        self, q: ConfigurationLike, v: ConfigurationLike | None, a: ConfigurationLike | None
+    ) -> list[FloatArray]:
+        if v is None and a is not None:
             raise InputError("`a` can only be converted together with `v`")
-        letters = zip("qva", values, strict=True)
-        # Only v and a are optional.
-        given = [(letter, x) for letter, x in letters if letter == "q" or x is not None]
-        inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in given]
+        inputs = [configuration.parse_finite(self.tree, q, "q")]
+        rates = [(letter, x) for letter, x in (("v", v), ("a", a)) if x is not None]
+        inputs += [configuration.parse_finite(self.tree, x, letter) for letter, x in rates]
         common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         return inputs
 
