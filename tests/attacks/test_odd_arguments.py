@@ -5,6 +5,7 @@ import math
 import os
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -23,7 +24,7 @@ from urdfkin.dh import DHRow, DHTable
 from urdfkin.dh.screws import screws_from_rows
 from urdfkin.dh.units import COLUMNS
 from urdfkin.kinematics import bodies, rotation
-from urdfkin.model.tree import JointKind
+from urdfkin.model.tree import JointKind, Limit, Mimic
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import make_line_trajectory
 from urdfkin.verify.singular_values import SingularValues
@@ -260,6 +261,19 @@ def test_units_accept_the_names_of_the_units() -> None:
     # The text "radians" was once printed with the heading deg.
     assert dh.Units("degrees", "millimetres") == dh.parse_units("degrees", "millimetres")  # type: ignore[arg-type]
     assert dh.Units("radians").angle_name == "rad"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"mimic": Mimic("k", math.nan, 0.0)}, {"mimic": Mimic("k", 1.0, math.inf)},
+        {"limit": Limit(2.0, 1.0, 1.0, 1.0)}, {"limit": Limit(math.nan, 1.0, 1.0, 1.0)},
+        {"limit": "0 to 1"}, {"a": None}, {"a": True}, {"kind": "revolute"}, {"joint": None},
+    ],
+)  # fmt: skip
+def test_a_row_refuses_wrong_values(wrong: dict[str, Any]) -> None:
+    with pytest.raises(urdfkin.InputError):
+        replace(table_of_arm().rows[0], **wrong)
 
 
 @pytest.mark.parametrize("digits", [0, 18, -1, 2.5, "3", None, True])

@@ -31,7 +31,14 @@ from urdfkin.dh.units import Units, parse_units
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
-from urdfkin.errors.validators import as_instance, as_str, float_or_infinity, is_real, safe_repr
+from urdfkin.errors.validators import (
+    as_finite_float,
+    as_instance,
+    as_str,
+    float_or_infinity,
+    is_real,
+    safe_repr,
+)
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.mimic import Coupling, make_coupling
@@ -118,9 +125,22 @@ class DHRow:
                 found=self.kind.value if isinstance(self.kind, JointKind) else safe_repr(self.kind),
                 remedy="give a `JointKind`",
             )
+        self._check_mimic_and_limit(where)
+
+    def _check_mimic_and_limit(self, where: str) -> None:
         for name, kind in (("mimic", Mimic), ("limit", Limit)):
             if not isinstance(value := getattr(self, name), kind | None):
                 raise InputError(f"{name} must be a {kind.__name__}", where=where, found=safe_repr(value))
+        if self.mimic is not None:
+            as_str(self.mimic.mimicked_joint, "mimicked_joint")
+            for number in (self.mimic.multiplier, self.mimic.offset):
+                as_finite_float(number, f"{where}: each number of mimic")
+        if (limit := self.limit) is not None:
+            numbers = (limit.lower, limit.upper, limit.velocity, limit.effort)
+            if not all(is_real(x) and not math.isnan(float_or_infinity(x)) for x in numbers):
+                raise InputError("the limits must be numbers", where=where, found=safe_repr(limit))
+            if limit.lower > limit.upper:
+                raise InputError("`lower` is above `upper`", where=where, found=safe_repr(limit))
 
     @property
     def cells(self) -> tuple[float, float, float, float, float]:
