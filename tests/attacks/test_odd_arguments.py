@@ -257,6 +257,23 @@ def test_a_path_a_table_and_screws_refuse_numbers_that_are_not_finite(bad: float
                 method(q)
 
 
+def test_very_large_numbers_cause_no_warning_of_numpy() -> None:
+    arm = urdfkin.load("polar", verify=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for path in (arm.dh(), arm.screws()):
+            assert path.rounding([0.0, 1e300]) > 1e280
+        for check, value in ((rotation.rotation_from_quaternion, 4 * [1e300]), (as_axis, 3 * [1e300])):
+            with pytest.raises(urdfkin.InputError, match="norm inf"):
+                check(value)
+        with pytest.raises(urdfkin.errors.RangeError):
+            rotation.exp_rotation([1e300, 0.0, 0.0])
+
+
+def as_axis(value: Any) -> Any:
+    return rotation.rotation_about(value, 0.5)
+
+
 def test_units_accept_the_names_of_the_units() -> None:
     # The text "radians" was once printed with the heading deg.
     assert dh.Units("degrees", "millimetres") == dh.parse_units("degrees", "millimetres")  # type: ignore[arg-type]

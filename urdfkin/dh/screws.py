@@ -176,6 +176,7 @@ class ProductOfExponentials(Displayable):
         """
         return 2.0 * table_roundings(len(self.joints))
 
+    @np.errstate(over="ignore")  # The bound is then inf.
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 

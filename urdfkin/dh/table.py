@@ -539,6 +539,7 @@ class DHTable(Displayable):
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
+    @np.errstate(over="ignore")  # The bound is then inf.
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 

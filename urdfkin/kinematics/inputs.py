@@ -117,6 +117,7 @@ def as_matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) ->
     return array
 
 
+@np.errstate(over="ignore")  # The norm is then inf.
 def as_unit_vectors(value: ArrayLike, name: str) -> FloatArray:
     array = as_vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))

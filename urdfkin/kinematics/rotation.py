@@ -61,6 +61,7 @@ from urdfkin.kinematics.inputs import (
     as_rotations,
     as_unit_vectors,
     as_vectors,
+    check_range,
 )
 from urdfkin.kinematics.number_kinds import array_equations as eq
 
@@ -196,6 +197,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
 NORM_TOLERANCE = 1e-6
 
 
+@np.errstate(over="ignore")  # The norm is then inf.
 def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
     quat = as_vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
@@ -373,15 +375,19 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return along, p - along
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation matrix of a rotation vector."""
+    """Return the rotation matrix of a rotation vector.
+
+    If the square of the angle is too large for double precision, the function raises RangeError.
+    """
     vector = as_vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
     # np.sinc(x) is sin(pi x) / (pi x), and 1 for x = 0.
     half = np.sinc(angle / (2.0 * np.pi))
     R: FloatArray = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
-    return R
+    return check_range(R)
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
