@@ -70,11 +70,13 @@ def as_choice(value: str | None, default: str, name: str) -> str:
     return default if value is None else as_str(value, name)
 
 
-def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return a list of names as a tuple.
+def as_names(value: Any, name: str, *, ordered: bool = False) -> tuple[str, ...]:
+    """Return a list of names as a tuple. If the names are `ordered`, refuse a set.
 
     The caller must check that each name exists.
     """
+    if ordered:
+        refuse_set(value, name)
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"
@@ -83,6 +85,12 @@ def as_names(value: Any, name: str) -> tuple[str, ...]:
         return tuple(value)
     except TypeError:
         raise InputError(f"{name} must be a list of names", found=safe_repr(value)) from None
+
+
+def refuse_set(value: object, name: str) -> None:
+    # The order of a set of texts is different in each process.
+    if isinstance(value, set | frozenset):
+        raise InputError(f"{name} must have an order", found=safe_repr(value), remedy="give a list")
 
 
 def as_bool(value: object, name: str) -> bool:

@@ -703,7 +703,7 @@ class Robot(Displayable):
             from urdfkin.model.conventions import Conversion, find_convention
 
         if joints is not None:
-            joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints")]
+            joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints", ordered=True)]
         # Only MJCF and USD files have a digest.
         # urdfkin writes no masses into the URDF of these sources.
         has_masses = not self.origin.sha256 and self.source not in ("<pinocchio.Model>", "<yourdfpy>")

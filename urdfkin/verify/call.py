@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, NotFiniteError
-from urdfkin.errors.validators import safe_repr
+from urdfkin.errors.validators import refuse_set, safe_repr
 from urdfkin.kinematics.inputs import common_batch_shape
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.configuration import parse_and_normalise, parse_finite, parse_numbers
@@ -169,6 +169,7 @@ def _describe_array(out: object) -> str:
 def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
     if isinstance(frame, str):
         return False, (frame,)
+    refuse_set(frame, "a list of frames")
     try:
         return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator.
     except TypeError:
