@@ -420,7 +420,7 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a to the target program's convention.
 
-        If q is equal in both conventions, the result can be the array q itself.
+        If q, v or a is equal in both conventions, the result can be the given array itself.
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
@@ -454,6 +454,8 @@ class Conversion:
         self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a from the target program's convention.
+
+        If q, v or a is equal in both conventions, the result can be the given array itself.
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
