@@ -163,6 +163,24 @@ def test_a_disagreement_with_a_nan_ratio_is_raised_too(monkeypatch: pytest.Monke
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 
 
+class _RequiresGradient:
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy()")
+
+
+def test_symbols_of_casadi_and_tensors_with_a_gradient_are_input_errors(panda: Robot) -> None:
+    casadi: Any = pytest.importorskip("casadi")
+    for value, message in (
+        (casadi.SX.sym("q", 8), "q must be real numbers: found SX"),
+        (casadi.DM.zeros(8), r"q needs 8 numbers .* found shape \(8, 1\)"),
+        (_RequiresGradient(), "q cannot be converted to a NumPy array: .* Use tensor.detach"),
+    ):
+        with pytest.raises(InputError, match=message):
+            panda.placement(value, "panda_hand")
+    found = panda.placement(casadi.DM.zeros(8).T, "panda_hand")
+    assert np.array_equal(found[0], panda.placement(np.zeros(8), "panda_hand"))
+
+
 @pytest.mark.parametrize(
     "value",
     ["abc", np.ones(8) * 1j, [[1.0], [1.0, 2.0]], None, np.zeros(8, dtype="M8[s]"), ["0"] * 8],
@@ -191,9 +209,11 @@ REFUSED: list[tuple[Callable[[Robot], object], str]] = [
         r"do not broadcast: found \(2,\), \(4,\)",
     ),
     *(
-        (lambda x, frame=frame: x.jacobian(x.neutral(), frame), "a frame must be the name of a link or joint")
+        (lambda x, frame=frame: x.jacobian(x.neutral(), frame), "a frame must be a name of a link or joint")
         for frame in (3, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"]))
     ),
+    (lambda x: x.placement(Z(8), {HAND}), "a list of frames must have an order, and a set has none"),  # type: ignore[arg-type]
+    (lambda x: x.export("numpy", HAND, {"jacobian"}), "quantities must have an order"),  # type: ignore[arg-type]
     (lambda x: x.placement(Z(8), HAND, base={}), "base must be a BaseMotion or None: found dict"),  # type: ignore[arg-type]
 ]
 

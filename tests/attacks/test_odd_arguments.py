@@ -318,15 +318,6 @@ def test_rows_of_a_frame_motion_must_be_a_slice(robot: Robot) -> None:
                 method(rows)
 
 
-@pytest.mark.parametrize("kind", [set, frozenset])
-def test_a_set_of_frames_or_of_ordered_joints_is_refused(kind: type, robot: Robot) -> None:
-    # The order of a set is different in each process, and so was the result.
-    with pytest.raises(urdfkin.InputError, match="a list of frames must have an order"):
-        robot.placement([0.1, 0.2], kind(["b", "c"]))
-    with pytest.raises(urdfkin.InputError, match="joints must have an order"):
-        robot.convention("mujoco", joints=kind(["j", "k"]))
-
-
 def test_check_refuses_an_unknown_root_joint() -> None:
     with pytest.raises(urdfkin.InputError, match="root_joint must be 'floating', 'planar' or None"):
         urdfkin.check(ARM, root_joint="flaoting")

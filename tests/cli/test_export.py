@@ -49,6 +49,14 @@ def test_a_language_that_contradicts_the_suffix_is_refused_and_no_file_is_writte
     assert "good jacobian: 4 test vectors" in good("export --check", str(path.with_suffix(".h"))).text
 
 
+def test_a_quantity_has_one_function_and_the_message_about_a_wrong_one_names_exportable_ones() -> None:
+    names = "jacobian rate,jacobian_rate"
+    text = good("export planar_two_link --to numpy --quantity", names).text
+    assert text.count("def jacobian_rate(") == 1
+    message = refused("export planar_two_link --quantity jacobian-rate")
+    assert "unknown quantity 'jacobian-rate'; did you mean jacobian_rate, jacobian?" in message
+
+
 def test_an_export_on_standard_output_contains_no_log_command() -> None:
     done = good("export planar_two_link --to c --name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text

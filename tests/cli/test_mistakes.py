@@ -85,7 +85,7 @@ MISTAKES = {
     "info alex_psyonic_hands --mimic": "--no-mimic",
     "validate ur5 --html /nowhere/a.html": "/nowhere/a.html: cannot be written",
     "report none.json": "none.json: no such file",
-    "report": "give the JSON file",
+    "report": "give the FILE of `urdfkin validate --json FILE`",
     "report compare none.json none.json": "no such file",
     "plot ur5 -o a.svg": "--to VALUES",
     "plot ur5 --to neutral -o /nowhere/a.svg": "cannot be written",

@@ -300,6 +300,13 @@ def test_numpys_functions_refuse_inputs_that_are_not_real_numbers(
 
 
 @pytest.mark.parametrize("to", ["numpy", "array"])
+def test_functions_refuse_a_masked_value(to: str, tmp_path: Path) -> None:
+    velocity = module("planar_two_link", to, tmp_path, "velocity").velocity
+    masked = np.ma.array([0.3, 0.4], mask=[True, False])
+    refuses(velocity, masked, np.zeros(2), TypeError, "needs an array: found MaskedArray")
+
+
+@pytest.mark.parametrize("to", ["numpy", "array"])
 def test_nan_in_an_input_reaches_every_result_that_depends_on_it(to: str, tmp_path: Path) -> None:
     robot = robot_of("planar_and_floating_in_the_middle")
     own = module(robot, to, tmp_path, *_THREE)

@@ -184,8 +184,14 @@ def test_pinocchio_reads_the_complete_text_and_reduces_the_model_of_a_locked_rob
     assert locked.to_pinocchio(np.arange(7.0)).tolist() == list(range(7))
 
 
-def test_a_model_that_pinocchio_cannot_reduce_is_an_oracle_error() -> None:
+def test_a_model_that_pinocchio_cannot_reduce_is_an_oracle_error(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("panda", mimic=False).with_locked_joints({"panda_finger_joint1": 0.04})
+    assert robot.pinocchio_model(mimic=True).nq == robot.nq  # each finger has its own coordinate
+
+    def refuse(*_: Any) -> None:
+        raise ValueError("a locked joint is mimicked")
+
+    monkeypatch.setattr(pin, "buildReducedModel", refuse)
     with pytest.raises(OracleError, match="Pinocchio cannot lock joints of this robot"):
         robot.pinocchio_model(mimic=True)
 

@@ -12,7 +12,7 @@ import urdfkin
 from tests import urdfs
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees, z_joint
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors import InputError, NotFiniteError, RangeError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.model.chain import make_chain
 from urdfkin.model.path import ElementaryMotion, Path, elementary_pose
@@ -227,3 +227,21 @@ def test_select_refuses_the_name_of_a_frame_instead_of_a_chain() -> None:
     robot = urdfkin.load("planar_two_link")
     with pytest.raises(InputError, match="path must be a result of `chain` or `dh`: found 'tip'"):
         robot.select("tip", [0.1, 0.2])  # type: ignore[arg-type]
+
+
+def test_an_overflow_or_a_number_that_is_not_finite_is_an_error_in_each_form_of_a_path() -> None:
+    slides = [
+        urdfs.joint(f"x{i}", "prismatic", f"l{i}", f"l{i + 1}", "", "1 0 0", urdfs.limit()) for i in range(2)
+    ]
+    end = urdfs.joint("end", "fixed", "l2", "tip", 'xyz="1 2 3" rpy="0.1 0.2 0.3"', "")
+    robot = urdfs.built(*slides, end, verify=False)
+    path, table = robot.chain("tip"), robot.dh("tip")
+    calls = (path.placement, path.axes, path.origins, table.placement, table.frames)
+    for call in (*calls, robot.screws("tip").placement, robot.tree_parameters().placements):
+        assert np.isfinite(call(np.full(2, 1e300))).all()
+        with pytest.raises(RangeError, match="leaves the range"):
+            call(np.full(2, 1.7e308))
+    for call in (*calls, robot.screws("tip").placement):
+        for bad in (np.nan, np.inf):
+            with pytest.raises(NotFiniteError, match=f"x1: q must be finite: found {bad}"):
+                call(np.array([[0.0, 1.0], [0.0, bad]]))

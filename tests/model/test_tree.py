@@ -309,7 +309,8 @@ def test_from_pinocchio_inverts_to_pinocchio(everything: KinematicTree, mimic: b
 @pytest.mark.parametrize("turns", [0, 1, -3])
 @pytest.mark.parametrize("angle", [-math.pi, math.pi, np.nextafter(-math.pi, 0.0), 3.0, -0.0])
 def test_from_pinocchio_returns_angles_in_plus_minus_pi(everything: Any, angle: float, turns: int) -> None:
-    there = to_pinocchio(everything, np.full(4, angle + turns * math.tau), mimic=True)
+    x = angle + turns * math.tau
+    there = np.array([np.cos(x), np.sin(x), x, x, np.cos(x), np.sin(x)])
     found = from_pinocchio(everything, there, mimic=True)[[0, 3]]  # the wheel's, and the planar joint's
     assert (np.abs(found) <= math.pi).all()
     np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angle), atol=1e-14)
@@ -334,6 +335,23 @@ def test_from_pinocchio_refuses_a_mimic_joint_that_violates_its_rule(
         return
     with pytest.raises(InputError, match=f"{name}.*off by {abs(off):.3g}|off by {abs(off):.3g}.*{name}"):
         from_pinocchio(everything, there)
+
+
+def test_from_pinocchio_finds_the_turns_that_a_mimic_joint_shows(everything: KinematicTree) -> None:
+    q = np.array([[4.0, 0.0, 0.0, 0.0], [-20.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
+    there = to_pinocchio(everything, q)
+    np.testing.assert_allclose(from_pinocchio(everything, there), q, atol=1e-13)
+    with pytest.raises(InputError, match="lose whole turns, which move joint slide"):
+        to_pinocchio(everything, q, mimic=True)
+    np.testing.assert_allclose(to_pinocchio(everything, q[2], mimic=True)[:2], there[2, :2])
+
+
+def test_to_pinocchio_has_the_length_of_the_model_if_mimic_joints_move_freely() -> None:
+    for mimic in (True, False):
+        robot = urdfkin.load("panda", mimic=mimic, verify=False)
+        for same in (True, False):
+            model = robot.pinocchio_model(mimic=same)
+            assert robot.to_pinocchio(robot.neutral(), mimic=same).shape == (model.nq,)
 
 
 @pytest.mark.parametrize("at", [0, 4])

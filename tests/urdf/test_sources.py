@@ -52,6 +52,13 @@ def test_at_most_one_byte_more_than_the_limit_is_read(
     assert MAX_BYTES == 100_000_000
 
 
+@pytest.mark.parametrize("data", [b"#usda 1.0\n", b"PXR-USDC\x00\x09"])
+def test_a_usd_file_as_text_is_refused_with_the_reason(data: bytes) -> None:
+    for source in (data, io.BytesIO(data)):
+        with pytest.raises(UrdfError, match=r"this is USD, not XML.* a suffix such as \.usda"):
+            urdfkin.load(source)
+
+
 def test_a_folder_that_cannot_be_listed_is_not_called_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -562,6 +562,18 @@ def test_a_file_named_like_a_library_does_not_replace_the_library_and_requests_h
     assert run("verify", "a'b", "planar_two_link", "--program").code == 2
 
 
+@pytest.mark.parametrize("mimic", [True, False])
+def test_a_request_states_that_mimic_joints_move_freely(mimic: bool, tmp_path: Path) -> None:
+    kept = tmp_path / "request"
+    robot = urdfkin.load("panda", mimic=mimic, verify=False)
+    command = ["sed", "-u", "-e", f"w {kept}", "-e", 's/.*/{"result": [1]}/']
+    with Program(command, robot, "jacobian", "panda_hand", "local_world_aligned") as program:
+        program(robot.neutral())
+    request = json.loads(kept.read_text().splitlines()[0])
+    assert len(request["coordinates"]) == (8 if mimic else 9)
+    assert request.get("mimic", True) is mimic
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("tool", ["g++", "octave"])
 def test_the_examples_in_cpp_and_octave_agree(tool: str, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_str, safe_repr
-from urdfkin.kinematics.inputs import as_floats, rotation_defect
+from urdfkin.kinematics.inputs import as_floats, check_range, rotation_defect
 from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
@@ -142,7 +142,9 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        return self.path.poses(self.coupling.values(q))
+        values = self.coupling.values(q)
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.path.poses(values))
 
     @cached_property
     def path(self) -> Path:

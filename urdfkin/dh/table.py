@@ -39,6 +39,7 @@ from urdfkin.errors.validators import (
     is_real,
     safe_repr,
 )
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.mimic import Coupling, make_coupling
@@ -601,7 +602,7 @@ class DHTable(Displayable):
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
         constants = np.array([row.theta if row.kind.turns else row.d for row in self.rows])
         senses = np.array([row.sense for row in self.rows])
-        return self._path.frames(constants + senses * values)[..., ::2, :, :]
+        return self._path.finite_frames(constants + senses * values)[..., ::2, :, :]
 
     @cached_property
     def _path(self) -> Path:
@@ -630,7 +631,8 @@ class DHTable(Displayable):
             >>> arm.placement([math.pi / 2])[:3, 3].round(12).tolist()
             [0.0, 2.0, 0.0]
         """
-        return np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool)
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool))
 
 
 def as_table(table: object, name: str = "table") -> DHTable:

@@ -43,7 +43,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.inputs import as_finite, check_range
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
@@ -157,6 +157,10 @@ class TreeParameters:
             (..., joints, 4, 4) poses of the URDF link frames in the root frame.
         """
         q = self._parse(q)
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self._compute_placements(q))
+
+    def _compute_placements(self, q: FloatArray) -> FloatArray:
         values = self._values(q)
         frames = np.empty((*q.shape[:-1], len(self.rows), 4, 4))
         for j, row in enumerate(self.rows):

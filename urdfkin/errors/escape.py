@@ -1,7 +1,7 @@
 """Escape names from files, with one function for each output format.
 
-A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
-spreadsheet formulas. Each function escapes these parts of a name for one format.
+A name in a URDF may contain line ends or terminal escape sequences. A name may also contain bidirectional
+control characters, HTML or spreadsheet formulas. Each function escapes these parts of a name for one format.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any
 
 #: First characters that make a spreadsheet cell a formula.
 FORMULA_STARTS = ("=", "+", "-", "@")
-#: Pattern of a command of Azure or TeamCity, anywhere in a line.
+#: Matches an Azure or TeamCity command anywhere in a line.
 #: Group 1 is the character to escape.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: Patterns of commands in logs, for example `::error::`, of GitHub, Azure and TeamCity.
-#: GitHub executes a command only at the beginning of a line.
+#: Commands of GitHub (`::error::`), Azure and TeamCity in logs.
+#: GitHub executes a command only at a line's beginning.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
 #: Invisible character (word joiner).
@@ -28,14 +28,14 @@ _WORD_JOINER = "&#8288;"
 
 
 def escape_unprintable(text: str) -> str:
-    """Escape unprintable characters and line ends, so that the line is safe for a terminal."""
+    """Escape unprintable characters and line ends, for safe output in a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def log_line(text: str) -> str:
-    r"""Return one line that is safe for a terminal and for the log of a CI service.
+    r"""Return one line that is safe for terminals and CI logs.
 
     >>> print(log_line("::error::a\n##vso[b]"))
     :\u003aerror::a\n##vso\u005bb]
@@ -47,7 +47,10 @@ def log_line(text: str) -> str:
 
 
 def markdown_text(words: str) -> str:
-    """Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules."""
+    """Escape a sentence for one line of Markdown.
+
+    The line contains no markup, HTML, links, mentions, lists or rules.
+    """
     return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))
 
 
@@ -60,7 +63,10 @@ def markdown_cell(words: str) -> str:
 
 
 def markdown_code(name: str) -> str:
-    """Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell."""
+    """Return a name as Markdown code.
+
+    Backticks and bars are escaped. A bar would end a table cell.
+    """
     return "`" + (escape_unprintable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
 
@@ -89,7 +95,7 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def json_text(data: Any) -> str:
     r"""Return data as JSON text in ASCII.
 
-    A CI service can interpret text such as `##[error]` as a command. To prevent this, the function escapes
+    A CI service can interpret text such as `##[error]` as a command. Therefore, the function escapes
     the second `#` of each `##`. A JSON parser restores the original text.
 
     >>> print(json_text(["\u202e ##[error]"]))
@@ -108,9 +114,10 @@ def escape_sequence(c: str) -> str:
 
 
 def csv_cell(name: str) -> str:
-    r"""Escape a name for a CSV cell: one line that no spreadsheet interprets as a formula.
+    r"""Escape a name for a CSV cell.
 
-    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text. `from_csv_cell` removes the apostrophe.
+    The result is one line. No spreadsheet interprets the line as a formula. An apostrophe before `=`, `+`,
+    `-` or `@` marks the cell as text. `from_csv_cell` removes the apostrophe.
 
     >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
     ("'=cmd|'/C calc'!A0", 'joint1')

@@ -11,15 +11,15 @@ import math
 import re
 from typing import NamedTuple
 
-#: The matching time is linear in the length of the text.
+#: The matching time is linear in the text's length.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-#: `parse_float` and `parse_int` reject texts with more characters than this number.
+#: `parse_float` and `parse_int` reject texts with more characters.
 #: Python converts long integers in quadratic time.
 _MAX_LENGTH = 2000
 
-#: Patterns of invalid numbers, each with the remedy for the message.
-#: If several patterns match, the first pattern determines the remedy.
+#: Patterns of invalid numbers, with remedies.
+#: The first matching pattern determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -75,11 +75,11 @@ _MAX_QUANTITY_LENGTH = 200
 
 
 class ParsedNumber(NamedTuple):
-    """A parsed number. If the text has a unit, the number is converted to radians or metres.
+    """A parsed number. A number with a unit is converted to radians or metres.
 
     Attributes:
         unit: "rad", "m", or None for a number without a unit. A multiple of pi without a unit is in radians.
-        seconds_exponent: Exponent of the seconds in the denominator of the unit: 1 for rad/s, 2 for rad/s^2.
+        seconds_exponent: Exponent of the seconds in the denominator: 1 for rad/s, 2 for rad/s^2.
     """
 
     value: float
@@ -88,7 +88,9 @@ class ParsedNumber(NamedTuple):
 
 
 def parse_quantity(text: str) -> ParsedNumber | None:
-    """Parse a finite number with an optional unit, or return None for other text, such as a sum.
+    """Parse a finite number with an optional unit.
+
+    Return None for other text, such as a sum.
 
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)
@@ -126,6 +128,9 @@ def _product(factors: str) -> float | None:
 
 
 def radians_from_degrees(degrees: float) -> float:
-    """Convert degrees to radians. For k * 15 degrees, the result is exactly k * pi / 12 in floating point."""
+    """Convert degrees to radians.
+
+    For k * 15 degrees, the result is the double `k * pi / 12`.
+    """
     twelfths = degrees / 15.0
     return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(degrees)

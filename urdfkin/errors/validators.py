@@ -70,13 +70,11 @@ def as_choice(value: str | None, default: str, name: str) -> str:
     return default if value is None else as_str(value, name)
 
 
-def as_names(value: Any, name: str, *, ordered: bool = False) -> tuple[str, ...]:
-    """Return a list of names as a tuple. If the names are `ordered`, refuse a set.
+def as_names(value: Any, name: str) -> tuple[str, ...]:
+    """Return a list of names as a tuple.
 
     The caller must check that each name exists.
     """
-    if ordered:
-        refuse_set(value, name)
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"
@@ -87,10 +85,14 @@ def as_names(value: Any, name: str, *, ordered: bool = False) -> tuple[str, ...]
         raise InputError(f"{name} must be a list of names", found=safe_repr(value)) from None
 
 
-def refuse_set(value: object, name: str) -> None:
-    # The order of a set of texts is different in each process.
+def reject_set(value: object, name: str) -> None:
+    """Raise InputError for a set, because the order of a set is random."""
     if isinstance(value, set | frozenset):
-        raise InputError(f"{name} must have an order", found=safe_repr(value), remedy="give a list")
+        raise InputError(
+            f"{name} must have an order, and a set has none",
+            found=safe_repr(value),
+            remedy="give a list or a tuple",
+        )
 
 
 def as_bool(value: object, name: str) -> bool:
@@ -127,5 +129,5 @@ def safe_repr(value: object) -> str:
         text = repr(value)
         return text if len(text) <= 60 else f"{text[:57]}..."
     except Exception:
-        # For example, the repr of an int with 5,000 digits raises ValueError.
+        # The repr of an int with 5,000 digits raises ValueError.
         return f"an object of type {type(value).__name__}"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from urdfkin.compiled.plan import CompiledTree, StepField
-from urdfkin.errors import InputError
-from urdfkin.errors.validators import as_names, as_str
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors.validators import as_names, as_str, reject_set
 from urdfkin.export import recursion
 from urdfkin.export.check import EXPORT_MARK, SEAL
 from urdfkin.export.expression import Node, Number
@@ -18,7 +18,7 @@ from urdfkin.export.proof import Proof, make_proof
 from urdfkin.model.configuration import coordinate_names, velocity_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
-from urdfkin.verify.quantities import Quantity, find_quantity, recursive_quantities
+from urdfkin.verify.quantities import QUANTITIES, Quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
 #: Precedences of operators, the lowest first.
@@ -170,9 +170,14 @@ def exportable_quantities() -> list[Quantity]:
 
 
 def _parse_quantities(names: Collection[str]) -> list[Quantity]:
+    reject_set(names, "quantities")
     checked = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
-    rows = [find_quantity(name.replace("_", " ")) for name in dict.fromkeys(checked)]
-    possible = ", ".join(row.method for row in exportable_quantities())
+    names_of_methods = [row.method for row in exportable_quantities()]
+    for name in checked:
+        if name.replace("_", " ") not in QUANTITIES:
+            raise UnknownNameError("quantity", name, names_of_methods)
+    rows = [QUANTITIES[name] for name in dict.fromkeys(name.replace("_", " ") for name in checked)]
+    possible = ", ".join(names_of_methods)
     if not rows:
         raise InputError("no quantity to export", remedy=f"name some of {possible}")
     for row in rows:

@@ -85,7 +85,7 @@ def _numpy_first_lines(writer: Writer) -> list[str]:
     inputs = writer.function.inputs
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [
-        *(f"{x} = np.asarray({x})" for x in inputs),
+        *(f"{x} = np.asanyarray({x})" for x in inputs),
         *_input_check_lines(writer),
         *(f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs),
         f"shape = np.broadcast_shapes({shapes})",
@@ -163,7 +163,7 @@ def _demand({given}name, x, width):
         found = tuple(x.shape)
         raise ValueError(f"{{name}} needs {{width}} numbers on its last axis: found the shape {{found}}")
 '''
-_IS_ARRAY = """    if not {is_array}:
+_IS_ARRAY = """    if not ({is_array}):
         raise TypeError(f"{{name}} needs {array}: found {{type(x).__name__}}")
 """
 
@@ -277,7 +277,11 @@ DIALECTS = {
     "numpy": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}). Batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
-        helpers=_make_input_check('x.dtype.kind not in "biuf"', numbers="real numbers"),
+        helpers=_make_input_check(
+            'x.dtype.kind not in "biuf"',
+            numbers="real numbers",
+            is_array="not np.ma.is_masked(x)",
+        ),
         first_lines=_numpy_first_lines,
         input_format="{}[..., {}]",
         result=_make_array_result("np.empty((*shape, {1}))", "..., "),
@@ -290,7 +294,11 @@ DIALECTS = {
         imports="import numpy",
         helpers=_NAMESPACE
         + "\n"
-        + _make_input_check('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
+        + _make_input_check(
+            'not xp.isdtype(x.dtype, "real floating")',
+            "xp, ",
+            is_array='hasattr(x, "ndim") and not hasattr(x, "mask")',
+        )
         + "\n"
         + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
         first_lines=_array_first_lines,

@@ -1,4 +1,4 @@
-"""Motion of bodies: planar links, points and frames in moving frames, joints, tools, analytical Jacobians.
+"""Motion of planar links, moving points and frames, joints and tools; analytical Jacobians.
 
 The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook.
 
@@ -17,11 +17,14 @@ Results are relative to frame 0 and expressed in frame 0. Arguments and results 
 Six-vectors are [linear; angular]. Units are metres, radians and seconds.
 
 There are two Jacobians, which are often confused. The velocity Jacobian J_v (..., 6, n) converts joint
-velocities to the linear and the angular velocity of the end frame. The vector x contains the position and the
-orientation of the end frame. The manipulator Jacobian J converts joint velocities to the time derivative of
-x. Another name for J is analytical Jacobian. For three Euler angles in any sequence (the textbook uses
-"ZYZ"), x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7
-numbers and J is (..., 7, n).
+velocities to the end frame's velocity [linear; angular]. The vector x contains the end frame's position and
+orientation. The manipulator Jacobian J converts joint velocities to the time derivative of x. Another name
+for J is analytical Jacobian.
+
+| Orientation in x | Numbers in x | J |
+|---|---|---|
+| three Euler angles in any sequence; the textbook uses "ZYZ" | 6 | (..., 6, n) |
+| unit quaternion ("quaternion", scalar last) | 7 | (..., 7, n) |
 
 | Argument | InputError for |
 |---|---|
@@ -30,7 +33,7 @@ numbers and J is (..., 7, n).
 | rotation matrix | a matrix that is not a rotation |
 
 An unknown `representation` raises UnknownNameError. Functions with the argument `nearest` raise
-RepresentationSingularityError within this distance of the singularity of Euler angles.
+RepresentationSingularityError within this distance of the singularity.
 """
 
 from __future__ import annotations
@@ -134,7 +137,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """The three terms w x p, R v_1 and d-dot of a point's velocity (7.124), in m/s."""
+    """Terms w x p, R v_1 and d-dot of a point's velocity (7.124), m/s."""
 
     rotation: FloatArray
     relative: FloatArray
@@ -182,7 +185,9 @@ def point_acceleration(
 ) -> AccelerationParts:
     """Return the terms of a point's acceleration (7.125; 7.123 if v_1 = a_1 = 0).
 
-    The acceleration is `alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot`, with p = R p_1.
+    With p = R p_1, the acceleration is:
+
+    `alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot`.
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -307,7 +312,7 @@ def pose_rate_inverse(
 ) -> FloatArray:
     """Return C^-1 in x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C (6, 7) has several right inverses with `C C^-1 = I`. The function returns the inverse
+    For a quaternion, C (6, 7) has several right inverses (`C C^-1 = I`). The function returns the inverse
     that gives rates perpendicular to the quaternion.
     """
     if as_str(representation, "representation") == QUATERNION:

@@ -13,19 +13,19 @@ from urdfkin.system.lazy_import import is_instance
 
 FloatArray = NDArray[np.float64]
 
-#: Largest accepted difference between 1 and the norm of a unit vector.
-#: If a vector is normalised in double precision, its norm differs from 1 by at most 4e-16.
-#: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
+#: Largest accepted deviation of a unit vector's norm from 1.
+#: Normalised vectors deviate by at most 4e-16 in double precision.
+#: Vectors with only six digits do not give rotation matrices.
 UNIT_TOLERANCE = 1e-12
-#: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
-#: If R is rounded to nine decimals, every entry of R has an error of at most 5e-10.
-#: An entry of R R^T is the dot product of two rows of R.
-#: The absolute values of the entries in a row of R sum to at most sqrt(3).
-#: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
+#: Largest accepted entry of |R R^T - I| for rotations R.
+#: Nine-decimal rounding changes the entries by at most 5e-10.
+#: In each row, the sum of |entry| is at most sqrt(3).
+#: |R R^T - I| <= 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: Values of NumPy's `dtype.kind` for data that are not real numbers.
-#: The letters mean complex (c), bytes (S), text (U), timedelta (m), datetime (M) and void (V).
-#: For example, NumPy converts dates and the text "1.5" to floats without reporting an error.
+#: Values of NumPy's `dtype.kind` for unaccepted data.
+#: c: complex, S: bytes, U: text.
+#: m: timedelta, M: datetime, V: void.
+#: NumPy would convert dates and the text "1.5" to floats.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
@@ -39,12 +39,19 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
-        # Without this check, NumPy converts text and None in an object array to numbers or NaN.
+        # NumPy would convert text in an object array to numbers.
+        # NumPy would convert None to NaN.
         if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be real numbers", found=safe_repr(value)) from error
+    except RuntimeError as error:  # PyTorch raises this error for a tensor that requires a gradient.
+        raise InputError(
+            f"{name} cannot be converted to a NumPy array",
+            found=safe_repr(value),
+            remedy=str(error).partition("\n")[0],
+        ) from error
 
 
 def _is_masked(value: object) -> bool:
@@ -55,7 +62,7 @@ def _is_masked(value: object) -> bool:
 
 
 def check_range(result: FloatArray) -> FloatArray:
-    """Return the result of a computation with finite numbers. Raise RangeError if it is not finite."""
+    """Return the result of a computation. Raise RangeError if the result is not finite."""
     if not np.isfinite(result).all():
         raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
     return result

@@ -12,8 +12,8 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: The textbook's LaTeX symbols for parameters of the functions in `equations`. The keys are parameter names.
-#: If a parameter has no entry, its name is the LaTeX symbol.
+#: Parameter name in `equations` -> LaTeX symbol of the textbook.
+#: Without an entry, the parameter name is the LaTeX symbol.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -28,7 +28,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: LaTeX symbols that apply only to the parameters of one function. The keys are function names.
+#: Function name -> LaTeX symbols for the function's parameters.
 #: These symbols override `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
@@ -115,7 +115,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Return a term, column (tuple of terms) or matrix (tuple of rows) as LaTeX."""
+    """Convert a term, a tuple of terms, or a tuple of rows to LaTeX."""
     if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

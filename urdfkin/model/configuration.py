@@ -46,9 +46,9 @@ from urdfkin.model.tree import (
     limits_with_margin,
 )
 
-#: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
-#: If the limits of a joint exclude all of these values, `sample` draws larger values.
-#: Some upper bounds assume that joints without limits travel at most this distance (m) from zero.
+#: Largest |value| (rad or m) in `sample` of one-coordinate joints.
+#: If limits exclude all these values, `sample` draws larger values.
+#: Without limits, some bounds assume |q| <= `ASSUMED_LIMIT` (m).
 #: Few linear axes of robots are longer than 10 m.
 ASSUMED_LIMIT = 10.0
 #: Text of the condition under which an upper bound holds.
@@ -100,10 +100,10 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint that has one coordinate, without regard to mimic joints.
+    """Return the range of each joint with one coordinate, without mimic joints.
 
-    A range is cut to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. If a range is outside this
-    interval, only its part of length `ASSUMED_LIMIT` nearest to 0 remains.
+    A range is cut to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. An outside range keeps only its
+    part nearest to 0, of length `ASSUMED_LIMIT`.
     """
 
     def own_range(joint: Joint) -> tuple[float, float]:
@@ -120,9 +120,9 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint, reduced by the limits of its mimic joints.
+    """Return each joint's range, reduced by the limits of its mimic joints.
 
-    If the mimic joints allow at most one value, the range is not reduced.
+    If mimic joints allow at most one value, the range is not reduced.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -167,10 +167,11 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # Move each end inwards by the rounding error, so that the mimic joint is within its limits.
+    # Each end moves inwards by the rounding error.
+    # The mimic joint is then within its limits.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # A mimic joint with only one limit has an infinite `size`.
+    if not math.isfinite(error):  # A mimic joint with one limit has infinite `size`.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -181,11 +182,12 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
 
 
 def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
-    """Widen limits by one unit in the last place, because parsing rounds decimal limits."""
+    """Widen limits by one unit in the last place. Parsing rounds decimal limits."""
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: Allowed deviation from a mimic rule in `from_pinocchio`, per max(1, largest absolute value).
+#: Allowed deviation from a mimic rule in `from_pinocchio`.
+#: The unit is max(1, largest absolute value).
 _MIMIC_TOLERANCE = 1e-9
 
 
@@ -194,7 +196,7 @@ _Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
-#: Suffix and unit of each velocity of a planar or floating joint.
+#: Suffix and unit of a free joint's velocities.
 #: The unit lacks "/s" for v and "/s^2" for a.
 _VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
@@ -229,7 +231,10 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
-    """Return "rad", "m" or "" for each number of q, v or a, without the time unit."""
+    """Return "rad", "m" or "" for each number of q, v or a.
+
+    The result does not contain the time unit.
+    """
     return tuple(
         unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if symbol == "q" else _VELOCITY_SUFFIXES)
     )
@@ -307,7 +312,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def named_poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named poses.
 
-    In `ready`, a joint without a value is at 0, or in the middle of a range that excludes 0.
+    In `ready`, a joint without a value is at 0. If the range excludes 0, the joint is in the middle of the
+    range.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -327,8 +333,8 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value of each locked joint, rad or m.
 
-    If `joints` is given, all other joints are locked. A locked joint without a value in `lock` has the value
-    of the pose that `lock` names, or 0.
+    If `joints` is given, all other joints are locked. A locked joint without a value in `lock` is at 0. If
+    `lock` names a pose, the pose gives the value.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
@@ -479,8 +485,9 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Maximum number of configurations in which urdfkin looks for angles in degrees.
-#: A batch normally has one unit, so a few configurations are enough.
+#: Maximum number of configurations that are searched for degrees.
+#: A batch normally has one unit.
+#: Therefore, a few configurations are enough.
 _MAX_CHECKED = 16
 
 
@@ -530,13 +537,17 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
         if joint.kind.nq_pinocchio > joint.kind.nq:
             own = np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
         blocks.append(check_range(own))
-    return np.concatenate(blocks, axis=-1)
+    converted = np.concatenate(blocks, axis=-1)
+    if mimic and (omitted := [i for i, joint in enumerate(tree.joints) if joint.mimic]):
+        check_turns(tree, omitted, q, from_pinocchio(tree, converted, mimic=True), tree.name)
+    return converted
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert Pinocchio's configurations to urdfkin's.
 
-    (cos, sin) of a continuous or planar joint becomes an angle in [-pi, pi].
+    (cos, sin) of a continuous or planar joint becomes an angle in [-pi, pi]. `count_turns` adds the whole
+    turns that the mimic joints show.
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
@@ -561,6 +572,14 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             mimic_joints.append((joint, tree.q_index[i], values))
         else:
             own[..., tree.q_index[i] : tree.q_index[i] + joint.kind.nq] = values
+    for joint, mimicked_at in zip(tree.joints, tree.q_index, strict=True):
+        if joint.kind is JointKind.CONTINUOUS and not joint.mimic:
+            shown = [
+                (one.mimic.multiplier, one.mimic.offset, values[..., 0], one.kind is JointKind.CONTINUOUS)
+                for one, index, values in mimic_joints
+                if one.mimic and index == mimicked_at
+            ]
+            own[..., mimicked_at] += math.tau * count_turns(own[..., mimicked_at], shown)
     for joint, mimicked_at, values in mimic_joints:
         _check_mimic_rule(joint, own[..., mimicked_at], values[..., 0])
     return own
@@ -581,13 +600,70 @@ def _angle_of_pair(joint: Joint, values: FloatArray) -> FloatArray:
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
 
+#: Largest number of turns that `count_turns` finds from cosines and sines.
+_MAX_TURNS = 16
+
+
+def count_turns(angle: FloatArray, shown: Sequence[tuple[float, float, FloatArray, bool]]) -> FloatArray:
+    """Return the whole turns that mimic joints show in addition to a continuous joint's angle (rad).
+
+    Each mimic joint has a multiplier, an offset and a value. True: the value is known only up to whole turns.
+    If the values contradict the angle, the result has no meaning.
+
+    >>> count_turns(np.array(0.5), [(0.5, 0.0, np.array(0.25 + math.pi), False)]).tolist()
+    1.0
+    """
+    if not shown:
+        return np.zeros(angle.shape)
+    for multiplier, offset, value, is_pair in shown:
+        if multiplier and not is_pair:
+            return np.rint((value - offset - multiplier * angle) / (multiplier * math.tau))
+    # The first value that fits is nearest to 0: 0, 1, -1, 2, ... turns for a negative angle.
+    turns = np.array(sorted(range(_MAX_TURNS, -_MAX_TURNS - 1, -1), key=abs), np.float64)
+    turns = np.where(angle[..., None] > 0.0, -turns, turns)
+    fits = np.ones(turns.shape, bool)
+    for multiplier, offset, value, _ in shown:
+        rest = (value - offset - multiplier * angle)[..., None] - multiplier * math.tau * turns
+        fits &= np.abs(_without_turns(rest)) <= _MIMIC_TOLERANCE
+    return np.take_along_axis(turns, fits.argmax(axis=-1)[..., None], axis=-1)[..., 0]
+
+
+def _without_turns(angle: FloatArray) -> FloatArray:
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def check_turns(
+    tree: KinematicTree, joints: Sequence[int], q: FloatArray, recovered: FloatArray, where: str
+) -> None:
+    """Raise InputError if cosines and sines lose turns that move a joint of `joints`.
+
+    `recovered` is q after the conversion to cosines and sines and back.
+    """
+    for i in joints:
+        joint, at = tree.joints[i], tree.q_index[i]
+        if not joint.kind.has_axis or not q.size:
+            continue
+        multiplier = joint.mimic.multiplier if joint.mimic else 1.0
+        lost = multiplier * (q[..., at] - recovered[..., at])
+        lost = np.abs(_without_turns(lost) if joint.kind.turns else lost)
+        allowed = _MIMIC_TOLERANCE * max(1.0, abs(multiplier)) * np.maximum(1.0, np.abs(q[..., at]))
+        if (lost > allowed).any():
+            raise InputError(
+                f"the cosine and sine of an angle lose whole turns, which move joint {joint.name}",
+                where=where,
+                found=f"a difference of {lost.max():.3g} {'rad' if joint.kind.turns else 'm'}",
+                remedy="give an angle in [-pi, pi], or load with mimic=False (--no-mimic)",
+                question=QuestionsSection.MIMIC_JOINTS,
+            )
+
+
 def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArray) -> None:
     rule = joint.mimic
     if rule is None or not values.size:
         return
     deviation = rule.multiplier * mimicked_joint + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
-        deviation = np.arctan2(np.sin(deviation), np.cos(deviation))
+        deviation = _without_turns(deviation)
     if np.abs(deviation).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
         raise InputError(
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
@@ -600,7 +676,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: `sample` draws the positions of planar and floating joints from -2 to 2 m.
+#: Positions of free joints in `sample`: [-2, 2] m.
 _MAX_SAMPLED_POSITION = 2.0
 
 
@@ -671,8 +747,8 @@ def draw_samples(
 ) -> Samples:
     """Draw random samples for a validation.
 
-    A mimic joint may exceed its limits, because the equations are also valid there. In every eighth sample,
-    large velocities make the quadratic terms of the acceleration dominant (7.129, 7.130).
+    A mimic joint may exceed its limits. The equations are also valid there. Every eighth sample has large
+    velocities. The quadratic terms of the acceleration are then dominant (7.129, 7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_zero_and_limits:

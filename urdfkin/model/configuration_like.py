@@ -229,8 +229,7 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
                 "a list of labelled objects, such as dicts or rows of pandas, is not accepted",
                 where=where,
                 found=f"{len(value)} of them",
-                remedy="give one mapping or table from names to values, or numbers in the order of the"
-                " coordinates",
+                remedy="give one mapping or table from names to values, or numbers in coordinate order",
             )
         return None
     labels = _labels(value)
@@ -248,7 +247,9 @@ def _labels(value: object) -> list[Any]:
     if hasattr(type(value), "keys"):
         labels = list(table.keys())
     else:
-        labels = list(getattr(table, "column_names", getattr(table, "columns", ())))
+        columns = getattr(table, "column_names", getattr(table, "columns", ()))
+        # In CasADi, `columns` is a method.
+        labels = [] if callable(columns) else list(columns)
     return [] if labels == list(range(len(labels))) else labels
 
 

@@ -1,9 +1,8 @@
-"""The map from a path's coordinates q to the values G q + g of its joints, including mimic joints.
+"""Map a path's coordinates q to the joint values G q + g.
 
-The coordinates of a path are the independent joints that determine its joint values. The order of the
-coordinates is the order of their first use on the path. A mimic joint has no coordinate; the value of a mimic
-joint is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if the path
-does not contain the mimicked joint.
+The coordinates are the independent joints that determine the joint values. The coordinates have the order of
+their first use on the path. A mimic joint has no coordinate. The value of a mimic joint is `multiplier *
+q_mimicked + offset`. A mimicked joint outside the path is also a coordinate.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, NotFiniteError, QuestionsSection
-from urdfkin.kinematics.inputs import as_floats
+from urdfkin.kinematics.inputs import as_floats, check_range
 from urdfkin.model.configuration import parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
@@ -44,7 +43,7 @@ class Coupling:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the path's coordinates, in the order of their first use on the path."""
+        """Names of the path's coordinates, in the order of first use."""
         return tuple(dict.fromkeys(self._coordinate_by_joint))
 
     @cached_property
@@ -60,7 +59,7 @@ class Coupling:
     def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # The unit of a mimicked joint outside the path is unknown.
+        # A mimicked joint outside the path has no known unit.
         own = tuple(map(units.get, self.names))
         hints = {
             joint: Hint(
@@ -76,14 +75,14 @@ class Coupling:
     def values(self, q: ConfigurationLike) -> FloatArray:
         """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
-        # Each row of G has at most one nonzero number, so no matrix product is needed.
-        return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
+        with np.errstate(over="ignore"):  # RangeError replaces this warning.
+            # Each row of G has at most one nonzero number.
+            return check_range(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
-            values = self.layout(symbol).parse(by_name)
-        else:
-            values = as_floats(cast("ArrayLike", array), symbol)
+            return self._check_finite(self.layout(symbol).parse(by_name), symbol)
+        values = as_floats(cast("ArrayLike", array), symbol)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             names = ", ".join(self.names) or "none"
             raise InputError(
@@ -91,11 +90,13 @@ class Coupling:
                 found=f"shape {values.shape}",
                 remedy="take the path's coordinates from the robot's q, for example with select()",
             )
+        return self._check_finite(values, symbol)
+
+    def _check_finite(self, values: FloatArray, symbol: str) -> FloatArray:
         if not np.isfinite(values).all():
             where = tuple(np.argwhere(~np.isfinite(values))[0])
-            raise NotFiniteError(
-                f"{symbol} must be finite", where=self.names[where[-1]], found=str(values[where])
-            )
+            found = str(values[where])
+            raise NotFiniteError(f"{symbol} must be finite", where=self.names[where[-1]], found=found)
         return values
 
     @cached_property

@@ -23,8 +23,8 @@ class Reference(IntEnum):
     True
     """
 
-    own_axes: bool  #: Whether the results are in the frame's axes, not in the world's axes.
-    at_world: bool  #: Whether the linear motion is of the body point at the world's origin.
+    own_axes: bool  #: True: results in the frame's axes; False: world axes.
+    at_world: bool  #: True: motion of the body point at the world's origin.
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
         member = int.__new__(cls, number)

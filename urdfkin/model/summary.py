@@ -1,4 +1,4 @@
-"""The summary of a robot: the tree of its links and joints, with columns for axes, indices and limits."""
+"""The summary of a robot: a tree of links and joints with table columns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.model.configuration import range_reductions
 from urdfkin.model.tree import Joint, KinematicTree
 
-#: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
+#: Columns of the joint table.
+#: Limits of revolute joints are in rad and rad/s.
+#: Limits of prismatic joints are in m and m/s.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
 LEFT_ALIGNED_COLUMNS = (0, 1, 2, 3, 4, 5, 9)
 _LEFT_ALIGNED_JOINT_COLUMNS = (0, 1, 2, *(i + 1 for i in LEFT_ALIGNED_COLUMNS[2:]))

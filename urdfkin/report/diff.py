@@ -1,4 +1,4 @@
-"""The changes between two versions of a description, as lines, a table, Markdown and JSON data."""
+"""Show changes between two versions of a description: lines, table, Markdown, JSON data."""
 
 from __future__ import annotations
 

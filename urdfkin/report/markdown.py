@@ -1,4 +1,4 @@
-"""Markdown for a comment on a pull request: verdict, table, and failures with commands to reproduce them."""
+"""Markdown for a comment on a pull request: verdict, table, failures, commands."""
 
 from __future__ import annotations
 
@@ -46,9 +46,8 @@ def as_markdown(document: Document) -> str:
     foot = [
         "",
         *_cross_check_table(document["robots"]),
-        "The first table has the worst disagreement of each robot for each quantity, in multiples of"
-        " eps·scale. eps is 2^-52, and scale is the size of the terms that are added to compute the number."
-        " Rounding errors give 1 to 10.",
+        "The first table has the worst disagreements, in multiples of eps·scale. eps is 2^-52."
+        " scale is the size of the added terms. Rounding errors give 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",
@@ -144,12 +143,12 @@ def table_lines(
 
 
 def count_within(texts: Sequence[str], room: int) -> int:
-    """Return how many of the first texts, each with a line end, fit into `room` characters."""
+    """Return the number of first texts, with line ends, that fit into `room` characters."""
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 
 def fence_code(code: str) -> str:
-    """Return a code block with a fence longer than any run of backticks inside."""
+    """Return a code block. The fence is longer than any run of backticks inside."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
     lines = "\n".join(map(escape_unprintable, code.split("\n")))

@@ -24,7 +24,16 @@ from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
-from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_int, as_names, as_str, safe_repr
+from urdfkin.errors.validators import (
+    as_bool,
+    as_choice,
+    as_finite_float,
+    as_int,
+    as_names,
+    as_str,
+    reject_set,
+    safe_repr,
+)
 from urdfkin.export import DEFAULT_QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import as_finite, as_vectors
 from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
@@ -620,7 +629,8 @@ class Robot(Displayable):
             (..., model.nq).
 
         Raises:
-            InputError: a wrong length, or a number that is not finite.
+            InputError: a wrong length, or a number that is not finite. With `mimic=True`, a continuous joint
+                beyond pi, if its turns move a mimic joint to another pose.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").to_pinocchio("joint_1=0.5, joint_2=-1").tolist()
@@ -638,7 +648,7 @@ class Robot(Displayable):
 
         Args:
             mimic: True: the mimic joints follow their mimic rules; Pinocchio 4.1 then rejects some robots.
-                False: each mimic joint is an independent joint.
+                False: each mimic joint is an independent joint, as for a robot loaded with `mimic=False`.
 
         Raises:
             OracleError: Pinocchio does not accept this robot.
@@ -660,7 +670,8 @@ class Robot(Displayable):
         """Convert a configuration of the Pinocchio model to `q` (..., nq).
 
         This method is the inverse of `to_pinocchio`. In the result, angles of continuous joints are in [-pi,
-        pi]. `from_pinocchio(to_pinocchio(q))` returns the angles `-math.pi` and `math.pi` unchanged.
+        pi], unless a mimic joint shows more turns. `from_pinocchio(to_pinocchio(q))` returns the angles
+        `-math.pi` and `math.pi` unchanged.
 
         Args:
             q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
@@ -703,7 +714,8 @@ class Robot(Displayable):
             from urdfkin.model.conventions import Conversion, find_convention
 
         if joints is not None:
-            joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints", ordered=True)]
+            reject_set(joints, "joints")
+            joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints")]
         # Only MJCF and USD files have a digest.
         # urdfkin writes no masses into the URDF of these sources.
         has_masses = not self.origin.sha256 and self.source not in ("<pinocchio.Model>", "<yourdfpy>")

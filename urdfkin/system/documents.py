@@ -74,7 +74,7 @@ class DocumentKind(Generic[_T]):
     Attributes:
         verdicts: The possible verdicts; empty if the document has no header.
         command: Command that writes documents of this kind.
-        is_open: Whether a document may have unknown entries, for example of a later version of urdfkin.
+        is_open: Whether a document may have unknown entries, for example of later versions.
     """
 
     name: str
@@ -165,9 +165,9 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Convert a result to dicts, lists, strings and numbers; `from_data` converts the data back.
+    """Convert a result to dicts, lists, strings and numbers.
 
-    Infinity and NaN stay numbers.
+    `from_data` converts the data back. Infinity and NaN stay numbers.
     """
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
@@ -189,9 +189,10 @@ def read_json(path: Path) -> object:
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse JSON; raise InputError for invalid JSON, NaN, infinity, and numbers such as 1e999.
+    """Parse JSON.
 
-    An integer may exceed the range of doubles.
+    Raise InputError for invalid JSON, NaN, infinity, and numbers such as 1e999. An integer may exceed the
+    range of doubles.
     """
     try:
         return json.loads(content, parse_constant=_parse_finite, parse_float=_parse_finite)

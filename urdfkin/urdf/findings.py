@@ -1,6 +1,7 @@
-"""Findings: problems in a file, each with a code, a position, the wrong text and a remedy.
+"""Findings: problems in a file.
 
-Line and column numbers do not count a byte order mark.
+A finding has a code, a position, the wrong text and a remedy. Line and column numbers do not count a byte
+order mark.
 
 A comment in a URDF can silence warnings and notes, but not errors. The comment names the codes of the
 findings and gives a reason:
@@ -32,7 +33,7 @@ from urdfkin.errors.escape import escape_unprintable, log_line
 from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
-#: Maximum number of characters of a file that a message quotes.
+#: Maximum number of quoted characters in a message.
 MAX_QUOTE_LENGTH = 60
 
 
@@ -45,21 +46,26 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
 
 
 #: A line of more than `MAX_EXCERPT_LENGTH` characters is cut.
-#: A cut line has at most `MAX_EXCERPT_LEAD` characters before the underlined text.
+#: At most `MAX_EXCERPT_LEAD` characters then precede the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB_SPACES = "    "
 
 
 class ExcerptFormatter:
-    """Show lines of a file, and underline the wrong text of findings; `data` has no byte order mark."""
+    """Show lines of a file, and underline the wrong text of findings.
+
+    `data` has no byte order mark.
+    """
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
 
     def format(self, finding: Finding) -> str | None:
-        """Return the line of a finding, with carets below the wrong text; None if the finding marks no text.
+        """Return the line of a finding, with carets below the wrong text.
+
+        Return None if the finding marks no text.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -91,7 +97,8 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Upper bound (rad) on the rounding error of an angle of at most one revolution.
+#: Upper bound (rad) on the rounding error of an angle.
+#: The bound holds for angles up to one revolution.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -346,10 +353,19 @@ class Rule:
     """A kind of finding.
 
     Attributes:
-        id: The code of the findings: `URDF`, `MJCF` or `USD`, and three digits. A code is never reused. The
-            first digit of a URDF code is the topic: text and XML (1), elements and attributes (2), numbers
-            (3), names and structure (4), joints (5), probable mistakes (6), or inertials, geometry and
-            materials (7).
+        id: The code of the findings: `URDF`, `MJCF` or `USD`, and three digits. A code is never reused.
+
+    The first digit of a URDF code is the topic:
+
+    | Digit | Topic |
+    |---|---|
+    | 1 | text and XML |
+    | 2 | elements and attributes |
+    | 3 | numbers |
+    | 4 | names and structure |
+    | 5 | joints |
+    | 6 | probable mistakes |
+    | 7 | inertials, geometry and materials |
     """
 
     id: str
@@ -364,9 +380,10 @@ COMMENT_MARK = "urdfkin:"
 
 @dataclass(slots=True)
 class Comment:
-    """A comment with an instruction for urdfkin, and the `element` that begins after the comment.
+    """A comment with an instruction for urdfkin.
 
-    `follows_text` is true if other text precedes the comment on the same line.
+    `element` begins after the comment. `follows_text` is true if other text precedes the comment on the same
+    line.
     """
 
     text: str
@@ -407,7 +424,10 @@ class CommentIndex:
             self._comment_by_key.setdefault((*place, code), ignore)
 
     def find_reason(self, code: str, line: int, element: Element | None) -> str | None:
-        """Return the reason of the nearest comment that silences a finding, and mark the code as used."""
+        """Return the reason of the nearest comment that silences a finding.
+
+        Mark the code as used.
+        """
         places = [("line", line)]
         while element is not None:
             places.append(("element", id(element)))
@@ -419,20 +439,23 @@ class CommentIndex:
         return None
 
 
-#: Maximum number of misspelt names in a file that get suggestions.
+#: Maximum number of misspelt names with suggestions in a file.
 MAX_NAME_SEARCHES = 20
-#: Maximum number of names, and of compared pairs of characters, in one search for similar names.
+#: Maximum number of names in one search for similar names.
+#: Maximum number of compared character pairs in one search.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: With `fold`, one finding represents `MIN_FOLDED` or more warnings or notes with one code.
+#: `fold` combines warnings or notes of one code.
+#: `MIN_FOLDED` is the minimum number of findings.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: These codes are about inertials, shapes and materials, which kinematics does not use.
+#: Codes URDF7xx are about inertials, shapes and materials.
+#: Kinematics does not use these elements.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: With `fold`, the maximum number of errors with the same code that are reported separately.
+#: `fold` combines the errors of one code above this number.
 MAX_ERRORS_PER_CODE = 100
 
-#: Maximum number of findings with one code and severity that are stored completely.
+#: Maximum number of complete findings with one code and severity.
 #: For further findings, only the line numbers are stored.
 MAX_COMPLETE_FINDINGS = 10_000
 
@@ -462,7 +485,8 @@ class Reporter:
     #: Cache of `_spans` for one element.
     _cached_element: Element | None = None
     _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
-    #: Elements of the findings that are added before the call of `silence`, by the id of the finding.
+    #: Elements of findings that precede the call of `silence`.
+    #: The keys are the ids of the findings.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(
@@ -482,8 +506,9 @@ class Reporter:
     ) -> None:
         """Add a finding about an element, or about the line and column `position`.
 
-        The finding names `element` if `names_element` is True, otherwise the child of `<robot>` that contains
-        `element`. If warnings or notes are combined, the finding with the greatest `weight` represents all.
+        The finding names `element` if `names_element` is True. Otherwise, the finding names the child of
+        `<robot>` that contains `element`. The finding with the greatest `weight` represents combined warnings
+        or notes.
         """
         severity = rule.severity if severity is None else severity
         reason = None
@@ -518,7 +543,10 @@ class Reporter:
             self.silenced_findings.append((finding, reason))
 
     def silence(self, comment_index: CommentIndex) -> None:
-        """Silence all warnings and notes that the file's comments name, also those added after this call."""
+        """Silence the warnings and notes that the file's comments name.
+
+        Findings added after this call are also silenced.
+        """
         self.comment_index = comment_index
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
@@ -552,7 +580,7 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings, sorted by line; omit findings for which `is_reported` returns False.
 
-        Call `is_reported` once for each complete finding, in file order: the function may count findings.
+        Call `is_reported` once for each complete finding, in file order. The function may count findings.
         """
         pairs = [pair for group in self._groups.values() for pair in group.weighted_findings]
         if is_reported is not None:
@@ -569,9 +597,9 @@ class Reporter:
 
     @property
     def has_replaced_characters(self) -> bool:
-        """Whether an attribute value may contain a tab, a line end or a reference such as `&amp;`.
+        """Whether an attribute value may contain a tab, line end or reference.
 
-        XML parsers replace these characters.
+        XML parsers replace these characters. An example of a reference is `&amp;`.
         """
         if self._replaced_characters is None:
             self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
@@ -626,7 +654,10 @@ class Reporter:
 
 @dataclass(frozen=True, slots=True)
 class _AttributeSpan:
-    """Line, column (in characters) and byte indices of an attribute; `value` excludes quotation marks."""
+    """Line, column (in characters) and byte indices of an attribute.
+
+    The indices `value` exclude quotation marks.
+    """
 
     line: int
     column: int
@@ -634,7 +665,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Matches an attribute value up to its first tab, line end or reference such as `&amp;`.
+#: Matches an attribute value up to the first replaced character.
+#: XML parsers replace tabs, line ends and references.
 #: Possessive quantifiers keep the matching time linear.
 _REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
@@ -655,7 +687,7 @@ def _find_attribute_spans(data: bytes, element: Element) -> Iterator[tuple[str, 
 
 
 def start_of_blanks(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the first index of the white space that ends before the index `start`."""
+    """Return the first index of the white space before the index `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start

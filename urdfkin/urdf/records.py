@@ -1,7 +1,7 @@
-"""Records of the XML elements and joints of a URDF, and limits on the size of a URDF.
+"""Records of a URDF's elements and joints, and limits on its size.
 
-In the record of a joint, `kind`, `parent`, `child` and `axis` are None if the parser cannot read the value. A
-missing origin or axis has the default value of the URDF specification.
+A joint record contains None for each unreadable `kind`, `parent`, `child` or `axis`. A missing origin or axis
+has the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, fields
 
 from urdfkin.errors.validators import as_int
 
-#: Maximum depth of nested elements in a URDF that Pinocchio reads.
-#: Pinocchio's parser tinyxml2 counts the document as level 1, and refuses level 500.
+#: Maximum depth of nested elements that Pinocchio reads.
+#: In Pinocchio's parser tinyxml2, the document is level 1.
+#: The parser tinyxml2 refuses level 500.
 ORACLE_DEPTH = 498
 
 
@@ -24,10 +25,10 @@ class SizeLimits:
     Attributes:
         depth: Maximum number of levels of nested elements. The default is Pinocchio's limit.
         attributes: Maximum number of attributes of one element.
-        name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
+        name: Maximum length of the name of an element, attribute, link or joint.
         number: Maximum number of characters of one number.
         markup: Maximum number of bytes of one tag, comment or processing instruction. The default is the
-            limit of libxml2. urdfkin may accept up to 1 MB more, because it reads the file in pieces.
+            limit of libxml2. The file is read in pieces. Therefore, up to 1 MB more may be accepted.
     """
 
     bytes: int = 100_000_000
@@ -56,8 +57,8 @@ class Element:
     """An XML element of a URDF.
 
     Attributes:
-        offset: Index of the start tag's first byte, without counting a byte order mark.
-        top_level_ancestor: The child of `<robot>` that contains this element; None for `<robot>` and its
+        offset: Index of the start tag's first byte. A byte order mark is not counted.
+        top_level_ancestor: The child of `<robot>` that contains this element. None for `<robot>` and its
             children.
         text: The first characters of the text between the element's tags.
     """
@@ -73,7 +74,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        # To save memory, an element without children has no list of children.
+        # An element without children has no list, to save memory.
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -83,7 +84,10 @@ class Element:
         return [child for child in self.children if child.tag == tag]
 
     def find(self, tag: str) -> Element | None:
-        """Return the first child with a tag; URDF readers ignore further children with this tag."""
+        """Return the first child with a tag.
+
+        URDF readers ignore further children with this tag.
+        """
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
@@ -95,7 +99,10 @@ class Element:
 
     @property
     def top_level_element(self) -> Element:
-        """The child of `<robot>` that contains this element; this element if it is `<robot>` or a child."""
+        """The child of `<robot>` that contains this element.
+
+        For `<robot>` and its children, this property is the element itself.
+        """
         return self.top_level_ancestor or self
 
 

@@ -1,7 +1,7 @@
-"""Types of the JSON document of a validation, and the outcome of a validation run.
+"""Types of a validation's JSON document, and the outcome of a validation.
 
-The JSON schema is generated from these types. Only this module decides whether a run has passed, for new
-reports and for reports that are read from a file.
+The JSON schema is generated from these types. Only this module decides whether a run has passed. This holds
+for new reports and for reports from a file.
 """
 
 from __future__ import annotations
@@ -23,9 +23,7 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_NULL_MEANING = (
-    "null: infinite, for example because a result is NaN, or because two different values have the bound 0."
-)
+_NULL_MEANING = "null: infinite. Examples: a result is NaN; two different values have the bound 0."
 Units = Annotated[
     NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
 ]
@@ -101,8 +99,7 @@ class ReportedJoint(TypedDict):
     remaining_range: Annotated[
         ReportedRange | None,
         doc(
-            "The joint values for which all mimic joints of this joint are within their limits."
-            " null: the joint's whole range."
+            "Range of joint values with all mimic joints within their limits. null: the joint's whole range."
         ),
     ]
     locked: NotRequired[
@@ -116,14 +113,14 @@ class ReportedModel(TypedDict):
     name: Annotated[str, doc("The robot's name.")]
     source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
     path: Annotated[str | None, doc("Path of the robot's file; null for a robot given as text.")]
-    sha256: Annotated[Sha256, doc("SHA-256 of the URDF's text as UTF-8, or of the MJCF or USD file.")]
+    sha256: Annotated[Sha256, doc("SHA-256 of the URDF text (UTF-8), or of the MJCF or USD file.")]
     mimic: Annotated[
         bool | None,
-        doc("Whether mimic joints are coupled to the mimicked joints; null: the default of this robot."),
+        doc("Whether mimic joints are coupled to their mimicked joints. null: the robot's default."),
     ]
     root_joint: Annotated[
         Literal["floating", "planar"] | None,
-        doc("Kind of the joint between the world and the root link; null: there is no such joint."),
+        doc("Kind of the joint between the world and the root link. null: none."),
     ]
     nq: Annotated[Count, doc("Number of coordinates (length of q).")]
     nv: Annotated[Count, doc("Number of joint velocities (length of v and of a).")]
@@ -167,7 +164,7 @@ class ReportedFinding(TypedDict):
 
 
 class ReportedDHRow(TypedDict):
-    """The constant parameters of a row of a Denavit-Hartenberg table, in metres and radians."""
+    """Constant parameters of a Denavit-Hartenberg row, in metres and radians."""
 
     joint: Annotated[str, doc("Name of the joint.")]
     kind: Annotated[Literal["revolute", "continuous", "prismatic"], doc("Kind of the joint.")]
@@ -187,10 +184,7 @@ class ReportedDHRow(TypedDict):
     ]
     sense: Annotated[
         Literal[1, -1],
-        doc(
-            "1: the joint's value is added to theta or, for a prismatic joint, to d."
-            " -1: the joint's value is subtracted."
-        ),
+        doc("Sign of the joint's value in theta or, for a prismatic joint, in d."),
     ]
 
 
@@ -218,8 +212,8 @@ class Chain(TypedDict):
     worst: Annotated[
         Units,
         doc(
-            "Largest disagreement of a table's tip with Pinocchio in placement, Jacobian and acceleration, in"
-            " eps * scale. null: infinite, or nothing was compared."
+            "Largest disagreement with Pinocchio (placement, Jacobian, acceleration), in eps * scale."
+            " null: infinite, or nothing was compared."
         ),
     ]
     bound_ratio: Annotated[
@@ -252,7 +246,7 @@ class ReportedAccuracyLine(TypedDict):
 
 
 class ReportedAccuracy(TypedDict):
-    """Result of the accuracy study: differences of urdfkin and Pinocchio from values with fifty digits."""
+    """Result of the accuracy study: errors relative to values with fifty digits."""
 
     robot: Annotated[str, doc("The robot's name.")]
     samples: Annotated[Count, doc("Number of configurations in the accuracy study.")]
@@ -294,7 +288,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """For each library, the number of results in which it differs from two libraries that agree."""
+    """Number of outliers of each library. The two other libraries agree."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -313,10 +307,7 @@ class SecondOracle(TypedDict):
     alone: Alone
     undecided: Annotated[
         Count,
-        doc(
-            "Number of results that do not show which library is wrong: none or two of the three pairs of"
-            " libraries agree."
-        ),
+        doc("Number of disagreements without an outlier. None or two of the three pairs of libraries agree."),
     ]
 
 
@@ -340,16 +331,13 @@ class ReportedCheck(TypedDict):
     histogram: Annotated[
         list[Count],
         doc(
-            "Number of results in each bin. The first bin is below the first of `histogram_edges`, the last"
-            " bin is above the last edge, and every other bin is between two adjacent edges."
+            "Number of results in each bin. The bins lie between adjacent `histogram_edges`. The first bin is"
+            " below all edges. The last bin is above all edges."
         ),
     ]
     subjects: Annotated[
         Literal["frames", "joints", "columns"],
-        doc(
-            "Meaning of the entries of `worst_by_subject`: one for each frame, for each joint, or for each"
-            " column of the full Jacobian of all joints."
-        ),
+        doc("Subjects of `worst_by_subject`: frames, joints, or columns of the full Jacobian."),
     ]
     worst_by_subject: Annotated[list[Units], doc("The largest disagreement of each frame, joint or column.")]
     worst_case: Annotated[
@@ -373,7 +361,7 @@ class ReportedTimings(TypedDict):
 
 
 class ReportedSecondReading(TypedDict):
-    """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
+    """Comparison of links and joints: urdfkin and yourdfpy read the same text."""
 
     by: Annotated[str, doc("Name and version of the second URDF parser, yourdfpy.")]
     joints: Annotated[Count, doc("Number of compared joints, fixed joints included.")]
@@ -429,7 +417,7 @@ class ReportedRobot(TypedDict):
     ]
     accuracy: Annotated[
         ReportedAccuracy | None,
-        doc("Result of the accuracy study; null without `--accuracy`, or if the study has no result."),
+        doc("Result of the accuracy study. null: no option `--accuracy`, or no result."),
     ]
 
 
@@ -444,8 +432,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds, without compilation before the first chunk. If `urdfkin"
-            " report DIR` makes the report from a store, the sum of the robots' computing times."
+            "Wall time of the validation in seconds, without compilation before the first chunk."
+            " For a report from `urdfkin report DIR`: sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]
@@ -475,7 +463,7 @@ class ValidationVerdict(StrEnum):
 
 
 EXIT_DISAGREES, EXIT_BAD_INPUT, EXIT_NOT_VERIFIED = 1, 2, 3
-#: Exit code of an interrupted run, as in shells: 128 + SIGINT.
+#: As in shells: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
 _VERDICT_WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),

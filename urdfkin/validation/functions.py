@@ -1,9 +1,8 @@
 """Compare a user's function with urdfkin and the oracle.
 
-The user's function computes a quantity from q, from q and v, or from q, v and a. The function is called at
-random configurations, at the zero configuration and at the joint limits. The allowed difference is a derived
-bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with urdfkin, the error
-is in the function.
+The user's function computes a quantity from (q), (q, v) or (q, v, a). The configurations are random, zero and
+at the joint limits. The allowed difference is a derived bound on rounding errors. The error is in the
+function if urdfkin and the oracle agree.
 """
 
 from __future__ import annotations
@@ -73,8 +72,8 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: The function's inputs: q, or q and v, or q, v and a.
-        bound: Allowed difference of each number: the bound on rounding errors times `FunctionCheck.factor`.
-        replay: A command or a line of Python that computes the expected result.
+        bound: Allowed difference of each number: (rounding bound) * `FunctionCheck.factor`.
+        replay: Command or line of Python for the expected result.
     """
 
     sample: int
@@ -272,8 +271,8 @@ def verify_function(
     The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
     quantities, and v (nv,) and a (nv,) for some quantities. Without `convention`, the units are rad, m and s.
     The values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect.
-    Exceptions and wrong shapes are reported, and do not end the check.
+    eighth sample, v and a are a hundred times larger. Quadratic terms then have a visible effect. Exceptions
+    and wrong shapes are reported, and do not end the check.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -287,9 +286,9 @@ def verify_function(
         samples: Number of random configurations.
         seed: Seed of the random configurations.
         factor: The allowed difference is the bound on rounding errors times this factor. The bound is derived
-            for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
-            errors. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared
-            results agree with urdfkin's.
+            for a recursion from joint to joint. For a method with larger rounding errors, give a factor above
+            1. `FunctionCheck.smallest_factor` is the smallest `factor` with which all compared results agree
+            with urdfkin's.
         batch: If True, the function computes n configurations in one call, and returns n results. The
             function receives q (n, nq), v (n, nv) and a (n, nv).
         **options: Further arguments of the `Robot` method that computes the quantity, such as
@@ -552,9 +551,10 @@ class _Run:
         return converted
 
     def _compute_conversion_k(self, q: FloatArray) -> float:
-        """Return k; the rounding error of the conversion is at most k * eps * scale.
+        """Return k. The conversion's rounding error is at most k * eps * scale.
 
-        Reordering has no rounding errors. If angles are converted, for example from radians to degrees:
+        Reordering has no rounding errors. A conversion of angles, such as radians to degrees, has these
+        errors:
 
         - The error of an angle and of its rotation matrix is at most 2 eps |q|.
         - The error of a vector is at most the sum of the errors of all rotation matrices.
@@ -700,7 +700,7 @@ def _try_call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Return a copy of the result, because the function may reuse its arrays; None after an error."""
+    """Return a copy of the result, or None after an error. The function may reuse its arrays."""
     try:
         result = function(*inputs)
         if result is None:

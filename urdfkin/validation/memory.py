@@ -1,12 +1,12 @@
-"""Limit the memory of a validation, and estimate the memory that a robot needs.
+"""Limit the memory of a validation, and estimate a robot's memory.
 
-Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
-samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
-results do not depend on the other frames.
+Frames are compared in blocks, to limit the memory. The largest arrays are Jacobians: samples * frames * 6 *
+nv numbers. A frame's results do not depend on the other frames. Therefore, the size of the blocks does not
+change the report.
 
-Each of n local processes may use 1 / (2 n) of the memory that is free at the start. A process of an executor
-may use half of the free memory of its machine. If a robot needs more memory than one process may use,
-the robot is not verified. Its report states the needed and the allowed memory.
+Each of n local processes may use 1 / (2 n) of the initially free memory. A process of an executor may use
+half of its machine's free memory. A robot that needs more memory is not verified. Its report states the
+needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from pathlib import Path
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum size (bytes) of an array of results; one frame's array can be larger.
+#: Maximum size (bytes) of a block of results.
+#: The results of one frame may be larger.
 MAX_BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FREE_FRACTION = 0.5
 #: Measured memory of Pinocchio 4.1.0. Its workspace is proportional to nv^3.
 _BYTES_PER_NV_CUBED, _BYTES_PER_LINK = 64, 24_000
-#: Maximum number of arrays in memory at the same time; each contains the results of a block of frames.
+#: Maximum number of blocks of results in memory.
 _MAX_ARRAYS = 12
 _PROC = Path("/proc")
 _CGROUPS = Path("/sys/fs/cgroup")
@@ -72,7 +73,7 @@ def check(tree: KinematicTree, samples: int, allowed_bytes: int | None) -> None:
 
 
 def _find_free_bytes() -> Iterator[int]:
-    """Yield the free memory (bytes) under each limit: of the machine, of a control group, RLIMIT_AS."""
+    """Yield the free memory (bytes) under each limit: machine, control group, RLIMIT_AS."""
     for line in _read_lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024

@@ -1,11 +1,10 @@
-"""Write test vectors: configurations of a robot, and the results that a correct program computes for them.
+"""Write test vectors: configurations of a robot, and their correct results.
 
 The results are computed with at least 50 digits, and written with 17 digits. Each number has a tolerance.
-Test vectors name the robot's URDF file and the file's SHA-256. If the robot is not in the catalogue, its URDF
-file is written too. The file `robots/features.toml` defines small robots, each with one feature of URDF. All
-values are computed from the decimal numbers in the URDF. Configurations are computed from SHA-256 digests of
-the robot's name, the names of joints and indices. Therefore, the vectors depend only on the URDF and the
-robot's name.
+Test vectors name the robot's URDF file and the file's SHA-256. For a robot outside the catalogue, the URDF
+file is written too. The file `robots/features.toml` defines small robots, each with one feature of URDF.
+Results are computed from the decimals in the URDF. Configurations are computed from SHA-256 digests of names
+and indices. Therefore, the vectors depend only on the URDF and the robot's name.
 """
 
 from __future__ import annotations
@@ -57,21 +56,26 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Programs that read version 1 can read all versions 1.x.
+#: A program for version 1.0 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
-#: Number of configurations of each robot. The first configuration is the zero configuration.
-#: If the limits exclude zero, the joint is at the limit nearest to zero.
+#: Number of configurations of each robot.
+#: The first configuration is the zero configuration.
+#: Outside the limits, the nearest limit replaces zero.
 SAMPLES = 3
 #: Largest absolute value of random v and a.
-#: The same limit holds for random q of planar and floating joints, except quaternions.
+#: Random q of planar and floating joints have the same limit.
+#: Quaternions have no such limit.
 _MAX_RANDOM = 2.0
-#: Inputs are rounded to multiples of 1 / _STEPS_PER_UNIT, except quaternions and values at a joint limit.
-#: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
+#: Inputs are multiples of 1 / _STEPS_PER_UNIT.
+#: Exceptions are quaternions and values at a joint limit.
+#: Multiples of 1 / 1024 have at most ten decimals.
+#: A double represents these multiples without rounding.
 _STEPS_PER_UNIT = 1024.0
-#: The tolerance k * eps * scale is rounded to the nearest number with 12 significant digits.
-#: This rounding removes the last digits, which differ between processors.
-#: The tolerance is then rounded upward to 3 significant digits.
+#: Significant digits of the tolerance k * eps * scale.
+#: First, the tolerance is rounded to the nearest 12 digits.
+#: The removed digits differ between processors.
+#: Then, the tolerance is rounded upward to 3 digits.
 _TOLERANCE_DIGITS, _FIRST_TOLERANCE_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -79,9 +83,9 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The spatial acceleration is the classical acceleration minus w x v.
-#: The bound of ACCELERATION includes the error of w x v.
-#: Therefore, spatial and classical acceleration have the same bound.
+#: Spatial acceleration = classical acceleration - w x v.
+#: ACCELERATION's bound includes the error of w x v.
+#: Therefore, the two accelerations have the same bound.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -246,7 +250,7 @@ def make_configuration(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q, v and a of a sample.
 
-    The numbers depend only on the sample's index, and on the robot's name, joints and limits.
+    The numbers depend only on the sample's index and the robot's name, joints and limits.
     """
     q, ranges = neutral(tree), coordinate_ranges(tree)
     for joint, start in zip(tree.joints, tree.q_index, strict=True):
@@ -332,7 +336,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
     """Write the test vectors of the robot's default tip.
 
-    If the robot is not in the catalogue, the function also writes the URDF.
+    For a robot outside the catalogue, the function also writes the URDF.
     """
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
@@ -432,7 +436,7 @@ def _compute_results(
 ) -> Iterator[dict[str, Any]]:
     """Compute results with intervals of `digits` digits.
 
-    An entry of `value` is None if its interval is too wide for `format_decimal`.
+    `value` has None for an interval too wide for `format_decimal`.
     """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:

@@ -1,4 +1,4 @@
-"""Convert the arguments of a call to batches with one axis, and the results to the caller's shape."""
+"""Convert arguments to batches with one axis, and results to the caller's shape."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, NotFiniteError
-from urdfkin.errors.validators import refuse_set, safe_repr
+from urdfkin.errors.validators import reject_set, safe_repr
 from urdfkin.kinematics.inputs import common_batch_shape
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.configuration import parse_and_normalise, parse_finite, parse_numbers
@@ -51,7 +51,7 @@ class Call:
     Args:
         plan: Compiles the tree for link indices.
         q_v_a: (q,), (q, v) or (q, v, a).
-        additional_frames: Frames that the call computes, but that are not part of the result.
+        additional_frames: Computed frames that are not part of the result.
         options: Arguments of a quantity, for example `gravity`.
     """
 
@@ -110,8 +110,8 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError. A subclass may have a different
-        `reshape`, so that a kernel could write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError. With the `reshape` of a subclass, a
+        kernel could write past the end of `out`.
         """
         if out is None:
             return None
@@ -169,12 +169,12 @@ def _describe_array(out: object) -> str:
 def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
     if isinstance(frame, str):
         return False, (frame,)
-    refuse_set(frame, "a list of frames")
+    reject_set(frame, "a list of frames")
     try:
         return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator.
     except TypeError:
         raise InputError(
-            "a frame must be the name of a link or joint, or a list of such names",
+            "a frame must be a name of a link or joint, or a list of names",
             found=safe_repr(frame),
             remedy="robot.link_frames lists all links",
         ) from None

@@ -101,20 +101,17 @@ class LineEntry(TypedDict):
     checked: Annotated[Count, doc("Number of results that the oracle confirmed.")]
     worst: Annotated[
         NonNegativeFloat | None,
-        doc(
-            "Largest difference between a result and the oracle's result, in multiples of eps * scale;"
-            " null: this multiple is not finite."
-        ),
+        doc("Largest difference from the oracle's result, in eps * scale. null: not finite."),
     ]
     bound_ratio: Annotated[
         NonNegativeFloat | None,
-        doc("Largest ratio of a difference to its bound; null: the ratio is not finite."),
+        doc("Largest ratio of a difference to its bound. null: not finite."),
     ]
     unchecked: Annotated[Count, doc("Number of results that were returned without a check.")]
 
 
 class CertificateDocument(Header):
-    """A saved certificate as plain data: the checked and the unchecked results of a robot."""
+    """A saved certificate as plain data: a robot's checked and unchecked results."""
 
     robot: Annotated[str, doc("The robot's name.")]
     source: Annotated[
@@ -123,8 +120,8 @@ class CertificateDocument(Header):
     source_notes: Annotated[
         str,
         doc(
-            "Notes about the conversion of the source to URDF, and about locked joints;"
-            " empty for a URDF without locked joints."
+            "Notes about the conversion to URDF and about locked joints."
+            " Empty for a URDF without locked joints."
         ),
     ]
     oracle: Annotated[str, doc("Name and version of the oracle.")]
@@ -327,5 +324,6 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # The counts are not copied, because the copy may be used in another process.
+        # A copy's counts begin at 0.
+        # The copy may be in another process.
         return type(self), ()

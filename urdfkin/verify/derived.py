@@ -7,7 +7,7 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `derive_imu_reading` subtracts
-gravity from the oracle's result, in the sensor's axes. Because the two methods differ, a wrong sign of
+gravity from the oracle's result, in the sensor's axes. The two methods differ. Therefore, a wrong sign of
 gravity or a wrong order of steps causes a disagreement.
 """
 
@@ -42,8 +42,9 @@ def derive_analytical_jacobian(
         quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs = quaternion_jacobian(quat, J_v)
-        # q and -q are the same rotation, and results have qw >= 0.
-        # Both signs are accepted if |qw| is below the rounding error.
+        # Results have qw >= 0.
+        # Near qw = 0, rounding errors decide the sign of q.
+        # Near qw = 0, the check therefore accepts q and -q.
         opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
@@ -56,7 +57,7 @@ def derive_analytical_jacobian(
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's poses of the frames b relative to frame a, with a bound.
+    """Return an oracle's poses of frames b relative to frame a, and a bound.
 
     The last frame of `x.plan` is frame a.
 

@@ -1,12 +1,12 @@
-"""Read an MJCF file in a process with limits on time and memory, and compare the robot with MuJoCo's model.
+"""Read an MJCF file in a confined process, and compare the robot with MuJoCo's model.
 
-Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
-from the MJCF file to the tree. `load` therefore makes three comparisons:
+The process has limits on time and memory. Pinocchio reads the URDF text that urdfkin writes for the tree. The
+conversion from the MJCF file to the tree needs other checks. `load` therefore makes three comparisons:
 
-- MuJoCo computes the placements of bodies and sites, which must agree with the tree's placements.
+- MuJoCo's placements of bodies and sites must agree with the tree's placements.
 - The joint equalities of MuJoCo's model must agree with the tree's mimic rules.
-- Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently, so a
-  difference from Pinocchio is reported, but is not an error.
+- Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently.
+  Therefore, a difference from Pinocchio is reported, but is no error.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class MjcfReading:
         answer: Last answer with a robot, from the process that reads the file.
         shapes_refusal: Reason why MuJoCo compiles the file only without shapes and inertias. None if MuJoCo
             compiles the complete file. Not valid with `with_check_data=False`.
-        pinocchio: Placements of bodies by Pinocchio's MJCF reader, an error, or None without an answer.
+        pinocchio: Body placements by Pinocchio's MJCF reader, or an error. None: no answer.
     """
 
     urdf: str
@@ -83,7 +83,7 @@ def read_mjcf(
     is the name of the source in messages, for example `<stdin>`.
 
     Raises:
-        InputError: MuJoCo or urdfkin does not accept the file, or the process ends without a robot.
+        InputError: MuJoCo or urdfkin rejects the file, or the process ends without a robot.
     """
     version()
     name = source_name(source) if name is None else name
@@ -137,14 +137,14 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     """Compare a robot with MuJoCo's model, and return a sentence about the result.
 
     Raises:
-        OracleError: A body, a site or a mimic rule differs from MuJoCo's by more than rounding errors.
+        OracleError: A body, a site or a mimic rule differs by more than rounding errors.
     """
     tree, answer = verifier.tree, reading.answer
     q = unpack_array(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
-    # The factor 2 allows for the rounded angles in the URDF text.
+    # Factor 2: the URDF text has rounded angles.
     magnitudes = mujoco_magnitudes(compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE))
     bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -168,7 +168,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Return the largest ratio of error to bound, or None for a robot without mimic rules."""
+    """Return the largest ratio error / bound. None: the robot has no mimic rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())

@@ -1,7 +1,7 @@
-"""The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
+"""The table of quantities: names, shapes, functions, bounds and help texts.
 
-The methods of `Robot`, the checks, reports and the command line use this table. The table names functions by
-text and imports them at their first use, so that `--help` does not import NumPy.
+Methods of `Robot`, checks, reports and the command line use the table. Functions in the table are imported at
+their first use. Therefore, `--help` does not import NumPy.
 
 >>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)
@@ -57,15 +57,15 @@ class Quantity:
         ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
-        factors: Number of vectors in the longest product, for example 3 for w x (w x d).
+        factors: Number of vectors in the longest product. For example, w x (w x d) has 3 vectors.
             `make_bound` adds 1 to `factors` for LOCAL and WORLD.
         results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
-            the bound. Checks call this function, if there is one, instead of `ask_oracle` and `scale`.
+            the bound. If present, this function replaces `ask_oracle` and `scale`.
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
-        recursive: Whether one forward recursion computes the result, without further arguments such as
-            `gravity`.
+        recursive: Whether one forward recursion computes the result. False for results with further arguments
+            such as `gravity`.
         in_validation: `validate` compares the quantity if `recursive` and `in_validation` are True. False for
-            Hessians, which are nv times larger than Jacobians.
+            Hessians: nv times larger than Jacobians.
         has_reference: Whether `compute`, `scale` and `compute_intervals` have the argument `reference`.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.
@@ -182,8 +182,7 @@ VELOCITY = Quantity(
     units={"linear": "m/s", "angular": "rad/s"},
     command="velocity",
     summary="velocity of a frame",
-    help_text="Linear velocity of the frame's origin, m/s, and angular velocity, rad/s, for joint"
-    " velocities --v.",
+    help_text="Linear velocity of the frame's origin (m/s), and angular velocity (rad/s).",
     example="urdfkin velocity ur5 --q random --v 1,0,0,0,0,0 --frame tool0",
 )
 JACOBIAN = Quantity(
@@ -201,8 +200,7 @@ JACOBIAN = Quantity(
     heading="J",
     command="jacobian",
     summary="Jacobian of a frame",
-    help_text="Each row of the table is the frame's velocity when one joint velocity is 1 and all others"
-    " are 0.",
+    help_text="Each row is the frame's velocity for one joint velocity of 1. The other velocities are 0.",
     example="urdfkin jacobian panda --q random --seed 1 --frame panda_hand",
 )
 JACOBIAN_RATE = Quantity(
@@ -259,9 +257,9 @@ ACCELERATION = Quantity(
     units={"linear": "m/s^2", "angular": "rad/s^2"},
     command="acceleration",
     summary="classical acceleration of a frame",
-    help_text="Second derivative of the position of the frame's origin (m/s^2), and angular acceleration"
-    " (rad/s^2). --v and --a are the joint velocities and accelerations. Gravity is not included. --breakdown"
-    " lists the transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
+    help_text="Second derivative of the origin's position (m/s^2), and angular acceleration (rad/s^2)."
+    " Gravity is not included. --breakdown lists four terms of each joint (eq. 7.125): transverse,"
+    " centripetal, Coriolis and sliding."
     f" {QuestionsSection.TWO_ACCELERATIONS}, {QuestionsSection.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --breakdown",
 )

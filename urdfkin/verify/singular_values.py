@@ -15,9 +15,9 @@
 
     error of a sum of m products <= m eps * (sum of the absolute values of the products)
 
-*Range.* Norms and products of singular values do not leave the range of doubles in intermediate steps. Before
-a norm is computed, all numbers are divided by the largest number. Products are computed from mantissas and
-exponents. If the residual overflows, the lower bound is 0 and the upper bound is inf.
+*Range.* Intermediate norms and products stay within the range of doubles. Before a norm is computed, all
+numbers are divided by the largest number. Products are computed from mantissas and exponents. If the residual
+overflows, the bounds are 0 and inf.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
-#: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
+#: Largest relative rounding error of a sum of products.
+#: The bound covers a few dozen positive numbers.
 _RELATIVE_ROUNDING_ERROR = 256.0 * EPS
 _MAX_PRINTED_SAMPLES = 10
 
@@ -183,12 +184,11 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
         The derivative of a singular value is u^T J' v. The vectors u and v are the left and the right
-        singular vector, and J' is the derivative of J. If the smallest singular value may be 0, the gradient
-        may not exist, and the result is NaN.
+        singular vector. J' is the derivative of J. If the smallest singular value may be 0, the result is
+        NaN. The gradient may not exist.
 
         Args:
-            H: (..., 6, nv, nv) Hessian of the frame in LOCAL_WORLD_ALIGNED, from `Robot.hessian` with the
-                same q and base.
+            H: (..., 6, nv, nv) `Robot.hessian` of the frame in LOCAL_WORLD_ALIGNED, for the same q and base.
 
         Raises:
             InputError: H has another shape or contains a number that is not finite.
@@ -246,7 +246,7 @@ def singular_values(
         defect = _bound_orthogonality_error(U) + _bound_orthogonality_error(Vt.swapaxes(-1, -2))
         lower = s * _bound_below(1.0 - defect)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _bound_above(1.0 + defect)[..., np.newaxis] + residual[..., np.newaxis]
-    # NaN becomes 0 as a lower bound, and inf as an upper bound.
+    # A NaN becomes 0 (lower) or inf (upper).
     lower, upper = (
         np.nan_to_num(_bound_below(lower), nan=0.0),
         np.nan_to_num(_bound_above(upper), nan=np.inf, posinf=np.inf),
@@ -264,11 +264,12 @@ def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
 def _bound_norm(E: FloatArray) -> FloatArray:
     """Return an upper bound on the Frobenius norm of each matrix. All numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
+    # A matrix with inf is not scaled.
+    # The norm of such a matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
-        # `_RELATIVE_ROUNDING_ERROR` does not cover the sum of many squares.
+        # `_RELATIVE_ROUNDING_ERROR` does not cover sums of many squares.
         norm *= 1.0 + E.shape[-2] * E.shape[-1] * EPS
     return _bound_above(norm)
 

@@ -362,9 +362,9 @@ def test_a_matrix_with_a_wrong_number_of_columns_is_refused(name: str, arm: Robo
             call()
 
 
-@pytest.mark.parametrize("joints", ["joint_1", 3, ["joint_1", 2], ["joint_1", None]])
+@pytest.mark.parametrize("joints", ["joint_1", 3, ["joint_1", 2], ["joint_1", None], {"joint_1", "joint_2"}])
 def test_an_order_that_is_no_list_of_names_is_refused(joints: Any, arm: Robot) -> None:
-    with pytest.raises(InputError, match=r"joints must be a (list of names|name)"):
+    with pytest.raises(InputError, match=r"joints must (be a (list of names|name)|have an order)"):
         arm.convention("mujoco", joints)
 
 
@@ -419,6 +419,44 @@ def test_the_value_of_a_mimic_joint_in_a_convention_must_satisfy_the_mimic_rule(
         panda.with_convention("mujoco").jacobian(mujoco.to("ready"))
     free = urdfkin.load("panda", verify=False, mimic=False).with_convention("mujoco")
     assert free.jacobian(q).shape == (6, 9)
+
+
+@pytest.mark.parametrize("symbol", ["v", "a"])
+def test_the_velocity_or_acceleration_of_a_mimic_joint_must_satisfy_the_mimic_rule(
+    symbol: str, tmp_path: Path
+) -> None:
+    arm = arm_with(rule_of_b=mimic("a", 2, 0.1))
+    (tmp_path / "degrees.toml").write_text('angle = "deg"\n')
+    for name in ("mujoco", "pinocchio", str(tmp_path / "degrees.toml")):
+        convention = arm.convention(name)
+        q, *rates = convention.to([0.3], [1e9], [-3.0])
+        np.testing.assert_allclose(np.ravel(convention.from_(q, *rates)), [0.3, 1e9, -3.0], 1e-15)
+        rates["va".index(symbol)][1] *= 1.0 + 1e-8
+        with pytest.raises(InputError, match=rf"{symbol}, b: the value of a mimic joint contradicts"):
+            convention.from_(q, *rates)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+@pytest.mark.parametrize("multiplier", [1.0, -0.5, 1.5, 3.0])
+def test_cosines_and_sines_keep_the_turns_that_move_a_mimic_joint(kind: str, multiplier: float) -> None:
+    wheel = joint("wheel", "continuous", "l0", "l1", "", "0 0 1")
+    other = joint(
+        "other", kind, "l1", "l2", 'xyz="1 0 0"', "0 1 0", limit(-100, 100) + mimic("wheel", multiplier, 0.2)
+    )
+    robot = built(wheel, other, verify=False)
+    q = np.array([[0.5], [4.0], [-20.0], [2.0]])
+    turned = replace(find_convention("pinocchio"), rules={"wheel": JointRule(sign=-1.0, zero=0.3)})
+    for convention in (robot.convention("pinocchio"), robot.convention(turned)):
+        back = convention.from_(convention.to(q))
+        assert np.allclose(robot.placement(back, "l2"), robot.placement(q, "l2"), 0, 1e-13)
+    alone = robot.convention("pinocchio", ["other"])
+    if kind == "continuous" and multiplier in (1.5, 3.0):
+        assert np.allclose(alone.from_(alone.to([0.5])), [0.5], 0, 1e-15)
+        with pytest.raises(InputError, match="lose whole turns, which move joint wheel"):
+            alone.to(q)
+        return
+    back = alone.from_(alone.to(q))
+    assert np.allclose(robot.placement(back, "l2"), robot.placement(q, "l2"), 0, 1e-13)
 
 
 NAMES = ("1", "12a", "a-b", "joint.1", "a b", "é", "-", "_x", "", "a/b-c", "ok_2", "漢😀-é.", "root_joint.x")

@@ -1,4 +1,4 @@
-"""Convert q, v, a, Jacobians and six-vectors of a robot between urdfkin and another program.
+"""Convert q, v, a, Jacobians and six-vectors between urdfkin and another program.
 
 The target program has these joint velocities, joint accelerations and Jacobians:
 
@@ -7,9 +7,9 @@ The target program has these joint velocities, joint accelerations and Jacobians
     J_tool = S J M^-1
 
 M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
-rows if the target program has the angular rows first. urdfkin expresses the velocity of a floating or planar
-joint in the axes of the child link. M depends on q if, and only if, the target program expresses a part of
-this velocity in the axes of the parent link.
+rows if the target program has the angular rows first. For floating and planar joints, urdfkin's v is in the
+child link's axes. The target program may use the parent link's axes instead. Then, and only then, M depends
+on q.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Allowed deviation from a mimic rule, in the target program's unit, per max(1, |`_TargetNumber.factor`|).
+#: Allowed deviation from a mimic rule.
+#: The unit is the target program's, times max(1, |`_TargetNumber.factor`|, |expected value|).
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -43,7 +44,7 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """A number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
 
-    If `cos_or_sin` is not empty, the number is the cosine or sine of this value.
+    With `cos_or_sin`, the number is the cosine or sine of this value.
     """
 
     name: str
@@ -63,7 +64,8 @@ class _FreeJoint:
     q_index: int  #: First index in urdfkin's q.
     v_index: int  #: First index in urdfkin's v.
     target_slice: slice  #: Indices in the target program's v.
-    #: (3,) the link's origin or centre of mass, in the link's frame (m); None: unknown.
+    #: (3,) link origin or centre of mass, link frame (m).
+    #: None: unknown.
     velocity_point: FloatArray | None
 
 
@@ -133,8 +135,7 @@ class Conversion:
             raise InputError(
                 f"{how.title} has no known order of joints",
                 where=how.name,
-                remedy="pass the joint names in the order of this tool: joints=[...], or `joints` in a"
-                " TOML file",
+                remedy="pass joints=[...] in the order of this tool, or set `joints` in a TOML file",
             )
         own = {self._tool_name(one): one.name for one in self.tree.joints if one.original.kind.nv}
         all_names = [(name, self._find_joint_index(own.get(name, name))) for name in how.joints]
@@ -172,7 +173,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # A root joint that urdfkin added is not in the URDF text. The rank -1 sorts the root joint first.
+        # The URDF text lacks a root joint that urdfkin added. The rank -1 sorts the root joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -194,14 +195,17 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merge_fixed: bool
     ) -> list[int]:
-        """Sort siblings by `keys`; `merge_fixed` counts links that fixed joints connect as one link."""
+        """Sort siblings by `keys`.
+
+        With `merge_fixed`, links that fixed joints connect count as one link.
+        """
 
         def below(link: int) -> list[int]:
             joints, links = list[int](), [link]
-            # The loop appends links to the list and visits these links later.
+            # The loop appends links, and visits the links later.
             for parent in links:
                 for i in children.get(parent, []):
-                    # A locked joint is still a moving joint in the target program.
+                    # A locked joint moves in the target program.
                     if self.tree.joints[i].original.kind.nv or not merge_fixed:
                         joints.append(i)
                     else:
@@ -257,7 +261,7 @@ class Conversion:
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
         is_mimic = bool(joint.mimic)
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
-            # The cosine and sine need an angle in rad, whatever the convention's unit of angles is.
+            # Cosine and sine need rad, not the convention's angle unit.
             size, sign = abs(factor), math.copysign(1.0, factor)
             self._columns += [
                 _TargetNumber(
@@ -307,9 +311,9 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray | None:
-        """Return the centre of mass (3,) in the link's frame (m), or zeros if the URDF has none.
+        """Return the centre of mass (3,) in the link's frame (m).
 
-        None: The source's masses are unknown.
+        If the URDF has no centre of mass, the result is zero. None: The source's masses are unknown.
         """
         if not self._has_masses:
             return None
@@ -437,6 +441,11 @@ class Conversion:
         inputs = self._parse_inputs(q, v, a)
         with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
             results = [self._to_target_q(inputs[0])]
+            if self.has_pairs and (omitted := set(range(len(self.tree.joints))) - set(self._order)):
+                recovered = self._recover_q(results[0])
+                configuration.check_turns(
+                    self.tree, sorted(omitted), inputs[0], recovered, self.convention.name
+                )
             if len(inputs) > 1:
                 results.append(self._to_target_rates(inputs[0], inputs[1]))
             if len(inputs) > 2:
@@ -521,6 +530,12 @@ class Conversion:
         return target_q
 
     def _from_target_q(self, target_q: FloatArray) -> FloatArray:
+        q = self._recover_q(target_q)
+        expected = self._to_target_q(q) if any(column.is_mimic for column in self._columns) else target_q
+        _check_mimic_numbers(self._columns, target_q, expected, "q")
+        return q
+
+    def _recover_q(self, target_q: FloatArray) -> FloatArray:
         if self._same_q:
             return target_q
         source = self._q_target_index
@@ -530,34 +545,31 @@ class Conversion:
         for at, k in enumerate(source):
             column = self._columns[k]
             if column.cos_or_sin:
-                pair = target_q[..., k : k + 2]
-                norm = np.linalg.norm(pair, axis=-1)
-                if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
-                    raise InputError(
-                        "the cosine and sine of a joint must have norm 1",
-                        where=column.name,
-                        found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
-                    )
-                angle = np.arctan2(pair[..., 1], pair[..., 0])
-                q[..., at] = (angle - column.zero) / column.factor
-        copies = [(k, column) for k, column in enumerate(self._columns) if column.is_mimic]
-        expected = self._to_target_q(q) if copies else target_q
-        for k, column in copies:
-            difference = float(np.abs(target_q[..., k] - expected[..., k]).max(initial=0.0))
-            if difference > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
-                raise InputError(
-                    "the value of a mimic joint contradicts its mimic rule",
-                    where=column.name,
-                    found=f"a difference of {difference:.3g}, in the unit of this value in the convention",
-                    remedy="correct the value, or load with mimic=False (--no-mimic)",
-                    question=QuestionsSection.MIMIC_JOINTS,
-                )
+                angle = _angle_of_pair(target_q, k, column.name) - column.zero
+                shown = self._find_shown_turns(target_q, column)
+                angle = angle + math.tau * configuration.count_turns(angle, shown)
+                q[..., at] = angle / column.factor
         return q
+
+    def _find_shown_turns(
+        self, target_q: FloatArray, source: _TargetNumber
+    ) -> list[tuple[float, float, FloatArray, bool]]:
+        """Return the arguments of `count_turns` for the mimic joints of a source column."""
+        return [
+            (
+                column.factor / source.factor,
+                column.zero,
+                _angle_of_pair(target_q, k, column.name) if column.cos_or_sin else target_q[..., k],
+                bool(column.cos_or_sin),
+            )
+            for k, column in enumerate(self._columns)
+            if column.is_mimic and column.index == source.index and column.cos_or_sin != "sin"
+        ]
 
     def _to_target_rates(
         self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M x + M' v for x = `own_rates`, or M x if `v` is None."""
+        """Return M x + M' v, with x = `own_rates`. Without v, return M x."""
         if self._same_v:
             return own_rates
         rates: FloatArray = own_rates[..., self._v_index]
@@ -579,10 +591,9 @@ class Conversion:
         """Return M^-1 (x - M' v) for x = `target_rates`, or M^-1 x if `v` is None."""
         if self._same_v:
             return target_rates
-        rates: FloatArray = target_rates[..., self._v_target_index]
-        if self._plain_v:
-            return rates
-        rates = rates / self._v_factor[self._v_target_index]
+        rates: FloatArray = target_rates[..., self._v_target_index] / self._v_factor[self._v_target_index]
+        expected = rates[..., self._v_index] * self._v_factor
+        _check_mimic_numbers(self._rates, target_rates, expected, "v" if v is None else "a")
         for block in self._blocks:
             own = slice(block.v_index, block.v_index + block.joint.kind.nv)
             part = target_rates[..., block.target_slice]
@@ -674,7 +685,7 @@ class Conversion:
         assert block.joint.kind is JointKind.FLOATING
         if block.velocity_point is None:
             raise InputError(
-                "velocities of a centre of mass need the masses, which urdfkin reads only from a URDF file",
+                "velocities of a centre of mass need masses; urdfkin reads masses only from a URDF file",
                 where=f"{how.name}: joint {block.joint.name}",
                 remedy='load a URDF file, or write a convention file with point = "origin"',
             )
@@ -714,7 +725,7 @@ class Conversion:
         return self.columns(q, self.reorder_six_vector(_as_matrices(J, "J", self.tree.nv), -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the columns of a matrix J to the target program, as J M^-1.
+        """Convert the columns of J to the target program: J M^-1.
 
         Each row of J must have the same meaning in both conventions.
 
@@ -858,7 +869,7 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the reordering that converts "q" or "v" from one convention to another, or None.
+    """Return the reordering from one convention to another for "q" or "v".
 
     The result is None if the robot has one of these numbers:
 
@@ -901,7 +912,10 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int | None:
-    """Return the index of a number that determines `target`, preferably not a mimic joint's, or None."""
+    """Return the index of a number that determines `target`, or None.
+
+    Independent joints are preferred to mimic joints.
+    """
     candidates = (
         k
         for k, x in enumerate(numbers)
@@ -911,7 +925,10 @@ def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int
 
 
 def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Return an index in `numbers` for each of urdfkin's coordinates, preferably not a mimic joint's."""
+    """Return an index in `numbers` for each of urdfkin's coordinates.
+
+    Independent joints are preferred to mimic joints.
+    """
     return [
         min(
             (k for k, x in enumerate(numbers) if x.index == at and x.factor),
@@ -919,6 +936,36 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
         )
         for at in range(count)
     ]
+
+
+def _angle_of_pair(target_q: FloatArray, k: int, name: str) -> FloatArray:
+    cosine, sine = target_q[..., k], target_q[..., k + 1]
+    norm = np.hypot(cosine, sine)
+    if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
+        raise InputError(
+            "the cosine and sine of a joint must have norm 1",
+            where=name,
+            found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
+        )
+    return np.arctan2(sine, cosine)
+
+
+def _check_mimic_numbers(
+    numbers: Sequence[_TargetNumber], found: FloatArray, expected: FloatArray, symbol: str
+) -> None:
+    for k, number in enumerate(numbers):
+        if not number.is_mimic:
+            continue
+        difference = np.abs(found[..., k] - expected[..., k])
+        allowed = _MIMIC_TOLERANCE * np.maximum(max(1.0, abs(number.factor)), np.abs(expected[..., k]))
+        if (difference > allowed).any():
+            raise InputError(
+                "the value of a mimic joint contradicts its mimic rule",
+                where=f"{symbol}, {number.name}",
+                found=f"a difference of {difference.max():.3g}, in the unit of this value in the convention",
+                remedy="correct the value, or load with mimic=False (--no-mimic)",
+                question=QuestionsSection.MIMIC_JOINTS,
+            )
 
 
 def _as_matrices(value: ArrayLike, name: str, *columns: int) -> FloatArray:
@@ -946,5 +993,5 @@ def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatAr
 
 
 def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
-    """Reshape a batch of matrices to (..., 1, k, l) for Jacobians of several frames."""
+    """Reshape matrices to (..., 1, k, l) for Jacobians of several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

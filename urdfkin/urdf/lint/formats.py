@@ -28,10 +28,10 @@ def as_sarif(
     silenced_findings: Sequence[tuple[Finding, str]] = (),
     files_with_mark: Collection[str] = (),
 ) -> str:
-    """Return a SARIF document with all rules about URDF files, and a result for each finding.
+    """Return a SARIF document: all URDF rules, and a result for each finding.
 
-    Rules about MJCF and USD are included only if a finding has their code. `files_with_mark` contains the
-    files that begin with a byte order mark. In SARIF, a byte offset of a fix counts this mark.
+    MJCF and USD rules are included only if findings have their codes. `files_with_mark` contains the files
+    that begin with a byte order mark. In SARIF, a byte offset of a fix counts this mark.
     """
     codes = {finding.code for finding in findings}
     rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
@@ -108,7 +108,7 @@ def _uri(file: str) -> str:
 
 
 #: Version of the JSON format.
-#: The number changes if a field is removed or changes its meaning.
+#: The version changes if a field is removed or redefined.
 JSON_VERSION = 1
 
 
@@ -117,7 +117,10 @@ def format_summary(findings: Sequence[Finding], files: int) -> str:
 
 
 def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield a line for each code; `[*]` means that `--fix` can fix at least one finding with this code."""
+    """Yield a line for each code.
+
+    `[*]` means that `--fix` can fix at least one finding.
+    """
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
@@ -135,7 +138,10 @@ def as_json(
     version: str,
     silenced_findings: Sequence[tuple[Finding, str]] = (),
 ) -> str:
-    """Return a JSON document. A position in a `fix` counts the bytes after a byte order mark, from 0."""
+    """Return a JSON document.
+
+    A position in a `fix` counts bytes from 0. A byte order mark is not counted.
+    """
     document = {
         "schema": "urdfkin-findings",
         "version": JSON_VERSION,

@@ -1,4 +1,4 @@
-"""Find the files and the settings for `urdfkin check`, and select the findings to report.
+"""Find files and settings for `urdfkin check`, and select the reported findings.
 
 The settings are in pyproject.toml:
 
@@ -9,12 +9,12 @@ The settings are in pyproject.toml:
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
 Files and patterns in the settings are relative to the folder of pyproject.toml. The patterns of `include`
-are an exception: urdfkin compares them with file names.
+are an exception. These patterns are compared with file names.
 
-The settings select the codes of findings, and can hide notes. A selected finding is reported if it is neither
-in the baseline nor in an older version of the file. A baseline is a JSON file with known findings. A finding
-is known if the baseline has an entry with the same file, code, severity, element, name and wrong text. Line
-numbers are not compared, so a finding is still known after you edit other lines.
+The settings select the codes of findings, and can hide notes. A selected finding is not reported if it is
+known. The findings of an older version of the file are known. The findings in a baseline, a JSON file, are
+also known. The comparison uses file, code, severity, element, name and wrong text. Line numbers are not
+compared. Therefore, a finding stays known after edits of other lines.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from urdfkin.urdf.lint.runner import Examination, find_local_path
 from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 
 #: Version of the baseline format.
-#: The number changes if a field is removed or changes its meaning.
+#: The version changes if a field is removed or redefined.
 BASELINE_VERSION = 1
 
 BaselineKey = tuple[str, ...]
@@ -74,7 +74,7 @@ class Baseline:
         return True
 
     def count_unmatched(self, files: Iterable[str]) -> int:
-        """Return the number of known findings in `files` that the run has not found."""
+        """Count the known findings in `files` that the run has not found."""
         checked = {relative_path(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -87,7 +87,10 @@ def relative_path(file: str, root: Path) -> str:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Read a baseline; raise InputError if the file is not a baseline, SourceError if it cannot be read."""
+    """Read a baseline.
+
+    Raise InputError if the file is not a baseline. Raise SourceError if the file cannot be read.
+    """
     counts = Counter[BaselineKey]()
     try:
         document = json.loads(read_text(path))
@@ -104,8 +107,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    If the file `path` contains an older baseline, its entries are copied, except entries about a file in
-    `files` or about a deleted file.
+    The file `path` can contain an older baseline. The older entries are copied, with two exceptions. Entries
+    about a file in `files` are omitted. Entries about a deleted file are also omitted.
     """
     counts = Counter(baseline_key(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -131,13 +134,17 @@ _TYPE_NAMES = {
     str: "a string",
 }
 
-#: Default patterns of robot files, without .xacro: most .xacro files describe only a part of a robot.
+#: Default patterns of robot files.
+#: Most .xacro files describe only a part of a robot.
 DEFAULT_INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The checked settings of a file; `file` is None if no file contains settings."""
+    """The checked settings of a file.
+
+    `file` is None if no file contains settings.
+    """
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -153,10 +160,16 @@ class Settings:
 
 
 def find_settings(start: Path) -> Settings:
-    """Return the settings of the nearest pyproject.toml with a table [tool.urdfkin], or empty settings.
+    """Return the settings of the nearest pyproject.toml with a table [tool.urdfkin].
 
-    The search goes upwards from `start`, up to the first folder that contains .git. Raise InputError for an
-    invalid setting, UnknownNameError for an unknown setting, and SourceError if the baseline does not exist.
+    The search goes upwards from `start`. The last searched folder is the first folder that contains .git. If
+    no table is found, return empty settings.
+
+    | Error | Cause |
+    |---|---|
+    | InputError | an invalid setting |
+    | UnknownNameError | an unknown setting |
+    | SourceError | the baseline does not exist |
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -216,9 +229,9 @@ def find_codes(words: Iterable[str]) -> frozenset[str]:
 def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     """Return whether a pattern matches a file or a folder above it.
 
-    A pattern without a slash is compared with each folder and file name of the path, relative to `root`. A
-    pattern with a slash is compared with the relative paths of the file and its folders. `*` matches any
-    characters, including slashes.
+    The path is relative to `root`. A pattern without a slash is compared with each name in the path. A
+    pattern with a slash is compared with the path and its parents. `*` matches any characters,
+    including slashes.
 
     >>> matches("robots/old/arm.urdf", ["old"], Path()), matches("robots/arm.urdf", ["robots/o*"], Path())
     (True, False)
@@ -263,7 +276,10 @@ class FindingFilter:
     def make_independent_predicate(
         self, text: UrdfText, older_findings: Baseline | None = None
     ) -> Callable[[Finding], bool]:
-        """Call `make_predicate` with copies of the baselines, so that the originals do not change."""
+        """Call `make_predicate` with copies of the baselines.
+
+        The baselines themselves do not change.
+        """
         copies = [
             known and replace(known, counts=Counter(known.counts))
             for known in (self.baseline, older_findings)
@@ -276,12 +292,12 @@ def find_known_findings(
 ) -> Baseline | None:
     """Return the findings of the older version of a file.
 
-    The result is None if the older version certainly has all current findings.
-    All findings of an unchanged file are known, with two exceptions:
+    Return None if the older version certainly has all current findings. All findings of an unchanged file are
+    known. There are two exceptions:
 
-    - All findings of a xacro file are new if a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed.
-      The xacro file may include the changed file.
-    - All findings about missing meshes are new if the URDF contains the name of a file that was deleted.
+    - A xacro file may include a changed file. All findings of the xacro file are then new. Only changed files
+      with a suffix of `_XACRO_INCLUDE_SUFFIXES` count.
+    - The URDF contains the name of a deleted file. All findings about missing meshes are then new.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
@@ -302,7 +318,7 @@ def find_known_findings(
     )
 
 
-#: urdfkin and ROS's build tools skip folders with one of these files.
+#: ROS's build tools and urdfkin skip folders with such files.
 FOLDER_IGNORE_FILES = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
@@ -311,7 +327,7 @@ def find_files(
 ) -> list[str]:
     """Return the files that `argument` names, in sorted order.
 
-    Raise SourceError if `argument` is empty, or if no file is found in a folder or for a pattern.
+    Raise SourceError if `argument` is empty, or if a folder or pattern contains no file.
     """
     if not argument:
         raise SourceError("the path is empty", remedy="give a file, or `.` for the current folder")

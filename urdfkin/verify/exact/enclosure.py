@@ -1,8 +1,8 @@
 """Enclosures: intervals that provably contain the true values of one sample.
 
-Interval arithmetic (`urdfkin.verify.exact.numbers`) evaluates `urdfkin.kinematics.equations` for the decimals
-in the URDF text and the exact values of q, v and a. An enclosure proves a bound on the rounding error. An
-enclosure does not prove that the equations are correct; the comparison with Pinocchio checks the equations.
+Interval arithmetic (`urdfkin.verify.exact.numbers`) evaluates `urdfkin.kinematics.equations`. The inputs are
+the URDF's decimals and the exact values of q, v and a. An enclosure proves a bound on the rounding error. An
+enclosure does not prove that the equations are correct. The comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, compute_oracle_results, compute_own_results
 
-#: A double distinguishes all decimals of 15 digits.
-#: The maximum of 10,000 digits limits the computing time.
+#: Different decimals of 15 digits are different doubles.
+#: The maximum limits the computing time.
 MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
 _round_ends = np.vectorize(interval_ends, otypes=[float, float])

@@ -19,16 +19,15 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 #: Largest plausible coordinate of a centre of mass, m.
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
-#: A nonzero mass (kg) below this number is probably a placeholder.
-#: If 0 < mass < NEGLIGIBLE_MASS, the moments of inertia are not checked.
+#: A smaller nonzero mass (kg) is probably a placeholder.
+#: For a smaller mass, moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: No principal moment may be negative or exceed the sum of the other two.
-#: The tolerance of these checks is this number (m^2) times the mass.
-#: This number is the moment of a body of 1 kg with a radius of gyration of 0.03 mm.
+#: Tolerance of a principal moment, divided by the mass (m^2).
+#: The value follows from a gyration radius of 0.03 mm.
 NEGLIGIBLE_MOMENT = 1e-9
 
-#: Relative rounding error of the moments of inertia, which exporters write with few digits.
+#: Relative rounding error of moments: exporters write few digits.
 _MOMENT_PRECISION = 1e-6
 
 _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -110,7 +109,10 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
 
 
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
-    """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula."""
+    """Return the eigenvalues of an inertia tensor, smallest first.
+
+    The eigenvalues are the roots of a cubic equation. The trigonometric formula gives the roots.
+    """
     scale = max(map(abs, moments))
     if scale == 0.0:
         return (0.0, 0.0, 0.0)
@@ -132,8 +134,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY_INCOMPLETE = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of each shape.
-#: A tuple contains the attribute's name, its count of numbers, and whether it is required.
+#: Numeric attributes of each shape: (name, count of numbers, required).
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

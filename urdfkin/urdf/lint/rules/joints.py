@@ -1,7 +1,7 @@
-"""Check that joints connect all links in one tree, and have usable axes, limits and mimic rules.
+"""Check that the joints form one tree. Check axes, limits and mimic rules.
 
-Legal values that are probably mistakes are also reported: rounded pi, degrees, millimetres, equal joints. No
-function is recursive, because a chain of 50,000 links would exceed Python's recursion limit.
+Probable mistakes are also reported: rounded pi, degrees, millimetres, equal joints. No function is recursive.
+A chain of 50,000 links would exceed Python's recursion limit.
 """
 
 from __future__ import annotations
@@ -112,14 +112,17 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _check_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; report any further links without a parent."""
+    """Return whether exactly one link has no parent.
+
+    Report any further link without a parent.
+    """
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.has_errors:
         report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
-    # If a child link is missing, each link without a parent may be the intended child.
+    # A root may be the missing child of a joint.
     if not children <= robot.links.keys():
         return False
     parents = {joint.parent for joint in robot.joints}
@@ -137,22 +140,22 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If an axis length differs from 1 by less than this number, the finding is a note.
-#: The cause is probably that the axis is rounded to few digits.
+#: A smaller error of an axis length is a note.
+#: An axis with few digits has such an error.
 NOTE_LENGTH_ERROR = 2e-4
 
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: An axis (x, y, z) counts as the z axis if z > 0 and |(x, y)| is at most this fraction of z.
+#: Maximum |(x, y)| / z of a z axis (x, y, z).
 _Z_AXIS_TOLERANCE = 1e-9
 
-#: Pinocchio replaces an axis by a coordinate axis if their relative difference is at most this number.
-#: The number is the default tolerance of Eigen's function `isApprox`.
+#: Default relative tolerance of Eigen's function `isApprox`.
+#: Within this tolerance, Pinocchio uses a coordinate axis.
 _EIGEN_TOLERANCE = 1e-12
 
-#: An angle (rad) up to this number between an axis and a coordinate axis is not reported.
-#: The error bounds in `verify.bounds` cover this angle.
+#: Maximum tilt (rad) of an axis that is not reported.
+#: The error bounds in `verify.bounds` cover this tilt.
 _NEGLIGIBLE_TILT = 2.0**-52
 
 
@@ -200,7 +203,10 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
-    """Divide a vector by its length; rounding rotates the result by at most 2**-53 rad."""
+    """Divide a vector by its length.
+
+    Rounding rotates the result by at most 2**-53 rad.
+    """
     with localcontext(prec=60):
         numbers = [Decimal(x) for x in vector]
         length = sum((x * x for x in numbers), Decimal(0)).sqrt()
@@ -222,18 +228,18 @@ def _check_snapped_axis(
 
 
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return, by joint name, the angle (rad) between the axis in the file and Pinocchio's axis.
+    """Return the angle (rad) between the file's axis and Pinocchio's axis.
 
-    Joints with an angle of at most 2^-52 rad have no entry.
+    The keys are joint names. Joints with an angle of at most 2^-52 rad have no entry.
     """
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
 
 
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
+    """Return the coordinate axis that Pinocchio uses, and its angle (rad) to `axis`.
 
-    Return None if Pinocchio uses `axis` itself, or if the angle is at most `_NEGLIGIBLE_TILT`.
+    Return None if Pinocchio uses `axis` itself. Return None also if the angle is at most `_NEGLIGIBLE_TILT`.
     """
     if axis is None:
         return None
@@ -273,7 +279,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # Since URDF 1.2, urdfdom checks the limits of all joint types.
+    strict = version >= (1, 2)  # From URDF 1.2, urdfdom checks all joint types.
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -329,10 +335,10 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest plausible multiplier or offset (rad or m) of a mimic joint.
+#: Largest plausible mimic multiplier or offset (rad or m).
 MAX_MIMIC_NUMBER = 1e6
-#: URDF527 reports limits that exclude more than this fraction of the mimicked joint's range.
-#: Limits with few digits often exclude a smaller part.
+#: Limits may exclude this fraction of the mimicked joint's range.
+#: Limits with few digits often exclude a smaller fraction.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -412,14 +418,13 @@ class _MimicChecker:
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
             message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
-            both = mimicked_joint.kind == "continuous"  # Pinocchio also refuses if only the latter is.
+            # Pinocchio also refuses a revolute mimic of a continuous joint.
+            both = mimicked_joint.kind == "continuous"
             remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = (
-                "name a joint that is not a mimic joint; some readers apply only one mimic rule of a chain"
-            )
+            remedy = "name a joint that is not a mimic joint; some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
@@ -442,7 +447,8 @@ class _MimicChecker:
         if is_allowed(bounds):
             return
         low, high = restrict_range(rule, bounds, *moving)
-        # `restrict_range` subtracts a rounding error at both ends, so a range of one value becomes empty.
+        # `restrict_range` subtracts a rounding error at each end.
+        # A range of one value becomes empty.
         # Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
@@ -465,7 +471,10 @@ class _MimicChecker:
         )
 
     def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and its last joint (None if missing, or in a cycle)."""
+        """Return the combined rule of a mimic chain, and the last joint.
+
+        The last joint is None if it is missing or in a cycle.
+        """
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.mimicked_joint, mimic.multiplier, mimic.offset)
@@ -480,7 +489,10 @@ class _MimicChecker:
 
 
 def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a revolute or prismatic joint, or +- pi for a continuous joint; otherwise None."""
+    """Return the limits of a revolute or prismatic joint.
+
+    The limits of a continuous joint are +- pi. Otherwise, return None.
+    """
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -513,20 +525,21 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 LENGTH_OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 
-#: Minimum coordinate (m) of a joint origin that is probably in millimetres.
+#: Coordinates (m) of at least this number are probably millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
+#: Minimum plausible length (m) of a robot's longest chain.
+#: The lengths of a smaller robot were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
-#: A whole-number limit is probably in degrees if `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
-#: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
+#: Whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
+#: Some exporters write larger placeholders for joints without limits.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: A rounded angle is a warning if the rounding moves the links after the joint by more than this length (m).
+#: Displacement (m) above which a rounded angle is a warning.
 NOTICEABLE_DISPLACEMENT = 1e-3
 
-#: Maximum difference (rad) of an angle that counts as an exact k * pi.
+#: Angles within this tolerance (rad) of k pi are exact.
 NEGLIGIBLE_ANGLE = 1e-10
 
 #: Pairs (k, n). A rounded k * pi has at least n decimals.
@@ -582,7 +595,7 @@ def _check_rounded(
 ) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
-    `reach` (m) bounds the distance to the links below; `condition` is the condition of this bound as text.
+    `reach` (m) bounds the distance to the links below. The text `condition` limits the validity of the bound.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
@@ -623,10 +636,10 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 
 
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return k > 0 and the exact angle if `angle` is a rounded multiple of pi, otherwise None.
+    """Return k > 0 and the exact angle k * pi or -k * pi.
 
-    The exact angle is k * pi or -k * pi. `text` is the angle as written in the file, and `angle` is the
-    number (rad).
+    Return None if `angle` is not a rounded multiple of pi. `text` is the angle in the file. `angle` is the
+    value of `text` (rad).
 
     >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -707,9 +720,9 @@ def _check_equal_joints(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return an upper bound (m) on each link's distance to its descendants, by link name.
+    """Return an upper bound (m) on each link's distance to its descendants.
 
-    The bounds assume that all translations of joints are 0.
+    The keys are link names. The bounds assume that all translations of joints are 0.
     """
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})

@@ -1,8 +1,8 @@
-"""Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes.
+"""Findings of `load` about MJCF and USD.
 
-A finding names an MJCF element by the tag and the name of the element, or a USD prim by its path. urdfkin
-searches for the element in the first 10 MB of the file, and adds the line of the element to the finding. In
-included files, other layers and binary files, urdfkin does not search for elements.
+The findings are about unsupported parts and probable mistakes. A finding names an MJCF element by
+tag and name. A USD prim is named by its path. The finding also contains the line of the element or prim. Only
+the first 10 MB of the file are searched. Included files, other layers and binary files are not searched.
 """
 
 from __future__ import annotations
@@ -40,17 +40,18 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
 _MAX_SEARCHED_BYTES = 10_000_000
-#: Beginnings and ends of XML markup that is not an element.
+#: Beginnings and ends of XML markup other than elements.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
 #: MJCF elements that findings report by tag, without a name.
-#: Keys are tags in the file; values are tags in the finding.
+#: Keys are tags in files. Values are tags in findings.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Beginning of a prim in a USD text file, or a delimiter.
-#: Delimiters are parentheses, braces, and the beginnings of comments, strings, references and arrays.
+#: Matches the beginning of a USD prim, or a delimiter.
+#: Parentheses and braces are delimiters.
+#: Comments, strings, references and arrays begin with a delimiter.
 _PRIM_OR_DELIMITER = re.compile(
     rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]'''
 )
-#: Beginnings and ends of comments, arrays, strings and references in USD.
+#: Beginning and end of USD comments, arrays, strings and references.
 _SKIPPED_TEXT = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
@@ -58,7 +59,7 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Maps (tag, name) of an element or prim to (line, column, width) of its beginning.
+#: Maps (tag, name) to a position (line, column, width).
 #: Lines and columns count from 1.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
@@ -129,10 +130,10 @@ def _find_positions(
 
 
 def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
-    """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
+    """Yield tag, name and byte span of MJCF elements that findings can name.
 
     An equality constraint without a name is identified by its index. After an `<include>`, the index is
-    unknown, so constraints without a name are skipped.
+    unknown. Constraints without a name are then skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
@@ -166,7 +167,7 @@ def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
 
 
 def _find_prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
-    """Yield "prim", the path and the span (in bytes) of each prim in a USD text file."""
+    """Yield "prim", path and byte span of each prim in a USD text."""
     above, prim, cursor, inside = list[str](), "", 0, 0
     while (found := _PRIM_OR_DELIMITER.search(data, cursor)) is not None:
         cursor, token = found.end(), found[0]
