@@ -26,6 +26,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.numbers import parse_float
+from urdfkin.errors.validators import as_bool
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
@@ -171,7 +172,7 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
         >>> print(found.changes[0])
         joint shoulder_pan_joint: limit lower -6.28318530718 -> -3.14159265359
     """
-    old, new = as_robot(a), as_robot(b)
+    old, new, effects = as_robot(a), as_robot(b), as_bool(effects, "effects")
     if _format(old) != _format(new):
         return _diff_across_formats(old, new, effects=effects)
     changes = tuple(_changes(old.urdf, new.urdf))

@@ -16,6 +16,7 @@ from urdfkin.dh.units import parse_units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
+from urdfkin.errors.validators import as_bool, as_finite_float
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.configuration import neutral, parse_finite
 from urdfkin.model.mechanisms.mechanism import (
@@ -250,7 +251,7 @@ class JointDifference:
         return f"{self.place}: {self.what} {self.b}{old}".replace("  ", " ") + explained
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tool:
     """Two matched links that `same` reports as different tools.
 
@@ -487,6 +488,8 @@ class Sameness(Displayable):
         >>> found.within(0.01), found.within(1.0)
         (False, True)
         """
+        if not (isinstance(most, float) and math.isinf(most)):
+            most = as_finite_float(most, "most")
         return {one.what for one in self.differences} <= BOUNDED_DIFFERENCE_KINDS and max(
             self.bound_as_written
         ) <= most
@@ -515,7 +518,7 @@ class Sameness(Displayable):
         >>> found.exit_code(), found.exit_code(within=1.0)
         (1, 0)
         """
-        return int(not self.holds(SameQuestion(within, strict)))
+        return int(not self.holds(SameQuestion(within, as_bool(strict, "strict"))))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.

@@ -35,7 +35,7 @@ from urdfkin.comparison.result import (
 )
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import as_finite_float, as_int
+from urdfkin.errors.validators import as_bool, as_finite_float, as_int
 from urdfkin.kinematics.roundings import EPS, SINGLE_ROUNDOFF
 from urdfkin.model.configuration import ASSUMED_LIMIT, range_reductions
 from urdfkin.model.conventions.convention import spellings
@@ -131,6 +131,7 @@ def same(
     robots = (as_robot(a), as_robot(b))
     joint_map = _as_joint_map(map)
     as_int(boxes, "boxes", 0)
+    as_bool(bounds, "bounds")
     if within is not None:
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):

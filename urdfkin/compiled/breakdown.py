@@ -42,6 +42,7 @@ from urdfkin.compiled.evaluate import compute_in_parts, placements, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.kinematics.inputs import as_sample_index
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
@@ -72,7 +73,15 @@ class AccelerationBreakdown(Displayable):
         return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
 
     def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
-        """Yield (joint, kind, six numbers) for each nonzero contribution of a sample."""
+        """Yield (joint, kind, six numbers) for each nonzero contribution of a sample.
+
+        Args:
+            sample: Indices of the sample in the batch; () for a single configuration.
+
+        Raises:
+            InputError: the sample does not exist.
+        """
+        sample = as_sample_index(sample, self.base.shape[:-1])
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):

@@ -21,7 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.table import DHConvention, DHRow, DHTable, as_a_and_alpha, convention_of
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, as_a_and_alpha, as_table, convention_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -36,7 +36,7 @@ from urdfkin.urdf.writer import to_urdf as write_urdf
 
 def to_convention(table: DHTable, convention: str) -> DHTable:
     """Return the table in the convention "standard" or "modified"."""
-    target = convention_of(convention)
+    table, target = as_table(table), convention_of(convention)
     if target is table.convention or not table.rows:
         return replace(table, convention=target)
     rows = table.rows
@@ -65,7 +65,7 @@ def to_tree(table: DHTable) -> KinematicTree:
 
     A mimicked joint without a row becomes a joint on the base.
     """
-    links = link_names(table)
+    links = link_names(as_table(table))
     joints = _serial_joints(table, [(_tree_kind(row), _tree_limit(row), row.mimic) for row in table.rows])
     triples = list(zip(joints, links, links[1:], strict=False))
     names = {row.joint for row in table.rows}

@@ -37,6 +37,7 @@ from urdfkin.dh.table import (
     link_transform,
 )
 from urdfkin.errors import InputError
+from urdfkin.errors.validators import as_str
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
@@ -75,7 +76,7 @@ class DerivationOptions:
 
     def __post_init__(self) -> None:
         for name, values in _OPTION_VALUES.items():
-            if (value := getattr(self, name)) not in values:
+            if (value := as_str(getattr(self, name), name)) not in values:
                 remedy = f"write {' or '.join(map(repr, values))}"
                 raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=remedy)
 

@@ -17,8 +17,9 @@ from urdfkin.dh.compare.signs import find_sign_fits
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import MAX_CELL_DIFFERENCE, DerivationOptions, derive
 from urdfkin.dh.snapping import check_snap_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
-from urdfkin.dh.table import DHConvention, DHTable, angle_difference, convention_of
+from urdfkin.dh.table import DHConvention, DHTable, angle_difference, as_table, convention_of
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
+from urdfkin.errors.validators import as_instance, as_names, as_str
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
@@ -152,12 +153,14 @@ def make_dh_table(
             planar or floating.
         RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
     """
+    as_instance(tree, KinematicTree, "tree", "pass robot.tree")
     exact = make_chain(tree, tip, base)
     # Pinocchio computes poses in the root frame.
     # Therefore, the whole path from the root is checked.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]
+    flip = tuple(as_str(name, "each of flip") for name in as_names(flip, "flip"))
     for name in flip:
         if name not in names:
             raise UnknownNameError("joint", name, names, where=f"path {exact.base} to {exact.tip}")
@@ -166,12 +169,13 @@ def make_dh_table(
         near_parallel,
         last,
         parallel_offset,
-        tuple(flip),
+        flip,
         first,
         sign,
         slide,
     )
     if like is not None:
+        as_table(like, "like")
         for name in _SET_BY_LIKE:
             if (value := getattr(options, name)) != getattr(DerivationOptions(), name):
                 raise InputError(

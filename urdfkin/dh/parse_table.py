@@ -29,7 +29,7 @@ from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, parse_units,
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNIT_SHORT_NAMES
-from urdfkin.errors.validators import safe_repr
+from urdfkin.errors.validators import as_path, safe_repr
 from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor
 from urdfkin.system.files import may_exist, read_text
 from urdfkin.system.resources import robots_dir
@@ -529,7 +529,8 @@ def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExp
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    return mapping_from_text(read_text(Path(path), pipes=True), Path(path).suffix.lower(), where=str(path))
+    file = as_path(path, "path")
+    return mapping_from_text(read_text(file, pipes=True), file.suffix.lower(), where=str(path))
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:

@@ -438,6 +438,8 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
         InputError: the convention is missing, a key is unknown, or `table_from_rows` raises this error.
         UnknownNameError: as in `table_from_rows`.
     """
+    if not isinstance(data, Mapping):
+        raise InputError("a table must be a mapping", found=safe_repr(data))
     if "convention" not in data:
         raise InputError(
             "the table does not name its convention",

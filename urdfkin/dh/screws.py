@@ -24,7 +24,7 @@ from urdfkin.dh.rows import check_keys, parse_name
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
-from urdfkin.errors.validators import safe_repr
+from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.kinematics.inputs import as_floats, check_range, rotation_defect
 from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
@@ -136,7 +136,7 @@ class ProductOfExponentials(Displayable):
             q: (..., coordinates) in the order of `coupling.names`.
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number is not finite.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").placement([0.0, 0.0])[:3, 3].tolist()
@@ -178,6 +178,7 @@ class ProductOfExponentials(Displayable):
         """
         return 2.0 * table_roundings(len(self.joints))
 
+    @np.errstate(over="ignore")  # The bound is then inf.
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 
@@ -298,6 +299,7 @@ def screws_from_rows(
     Raises:
         InputError: a shape, a screw, a name, M or `frame` is invalid, or the number of names is wrong.
     """
+    as_str(frame, "frame")
     S = as_floats(screws, "screws").copy()
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
     T = as_floats(M, "M")

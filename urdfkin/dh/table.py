@@ -19,7 +19,7 @@ d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -31,6 +31,14 @@ from urdfkin.dh.units import Units, parse_units
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
+from urdfkin.errors.validators import (
+    as_finite_float,
+    as_instance,
+    as_str,
+    float_or_infinity,
+    is_real,
+    safe_repr,
+)
 from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
 from urdfkin.model.configuration_like import ConfigurationLike
@@ -102,20 +110,38 @@ class DHRow:
     limit: Limit | None = None
 
     def __post_init__(self) -> None:
-        where = f"row of joint {self.joint}"
+        where = f"row of joint {as_str(self.joint, 'joint')}"
         for name in ("a", "alpha", "d", "theta", "beta"):
-            if not math.isfinite(getattr(self, name)):
-                raise InputError(
-                    f"{name} is not a finite number", where=where, found=str(getattr(self, name))
-                )
-        if self.sense not in (1, -1):
-            raise InputError("`sense` must be +1 or -1", where=where, found=str(self.sense))
-        if not self.kind.has_axis:
+            value = getattr(self, name)
+            if not is_real(value) or not math.isfinite(number := float_or_infinity(value)):
+                raise InputError(f"{name} is not a finite number", where=where, found=safe_repr(value))
+            object.__setattr__(self, name, number)
+        if not is_real(self.sense) or float_or_infinity(self.sense) not in (1.0, -1.0):
+            raise InputError("`sense` must be +1 or -1", where=where, found=safe_repr(self.sense))
+        object.__setattr__(self, "sense", int(float_or_infinity(self.sense)))
+        if not isinstance(self.kind, JointKind) or not self.kind.has_axis:
             raise InputError(
                 "the joint of a row must be revolute, continuous or prismatic",
                 where=where,
-                found=self.kind.value,
+                found=self.kind.value if isinstance(self.kind, JointKind) else safe_repr(self.kind),
+                remedy="give a `JointKind`",
             )
+        self._check_mimic_and_limit(where)
+
+    def _check_mimic_and_limit(self, where: str) -> None:
+        for name, kind in (("mimic", Mimic), ("limit", Limit)):
+            if not isinstance(value := getattr(self, name), kind | None):
+                raise InputError(f"{name} must be a {kind.__name__}", where=where, found=safe_repr(value))
+        if self.mimic is not None:
+            as_str(self.mimic.mimicked_joint, "mimicked_joint")
+            for number in (self.mimic.multiplier, self.mimic.offset):
+                as_finite_float(number, f"{where}: each number of mimic")
+        if (limit := self.limit) is not None:
+            numbers = (limit.lower, limit.upper, limit.velocity, limit.effort)
+            if not all(is_real(x) and not math.isnan(float_or_infinity(x)) for x in numbers):
+                raise InputError("the limits must be numbers", where=where, found=safe_repr(limit))
+            if limit.lower > limit.upper:
+                raise InputError("`lower` is above `upper`", where=where, found=safe_repr(limit))
 
     @property
     def cells(self) -> tuple[float, float, float, float, float]:
@@ -376,6 +402,16 @@ class DHTable(Displayable):
             object.__setattr__(
                 self, name, _check_pose(getattr(self, name), f"{name} of the table of {self.robot}")
             )
+        for name in ("robot", "base_frame", "tip_frame"):
+            as_str(getattr(self, name), name)
+        if not isinstance(self.rows, Sequence) or not all(isinstance(row, DHRow) for row in self.rows):
+            raise InputError(
+                "rows must be a list of DHRow",
+                where=f"table of {self.robot}",
+                found=safe_repr(self.rows),
+                remedy="for numbers use table_from_rows",
+            )
+        object.__setattr__(self, "rows", tuple(self.rows))
         names = [row.joint for row in self.rows]
         for name in names:
             if names.count(name) > 1:
@@ -504,6 +540,7 @@ class DHTable(Displayable):
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
+    @np.errstate(over="ignore")  # The bound is then inf.
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 
@@ -555,7 +592,7 @@ class DHTable(Displayable):
                 text). None means the zero configuration.
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number is not finite.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -585,7 +622,7 @@ class DHTable(Displayable):
                 text).
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number is not finite.
 
         Example:
             >>> import math
@@ -596,6 +633,10 @@ class DHTable(Displayable):
         """
         with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
             return check_range(np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool))
+
+
+def as_table(table: object, name: str = "table") -> DHTable:
+    return as_instance(table, DHTable, name, "read one with urdfkin.read_table(FILE)")
 
 
 def _check_pose(T: ArrayLike, where: str) -> FloatArray:

@@ -24,6 +24,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from urdfkin.compiled.plan import axis_pose
 from urdfkin.dh.common_normals import (
@@ -79,7 +80,7 @@ class TreeRow:
     offset: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TreeParameters:
     """The table of a whole robot.
 
@@ -110,12 +111,13 @@ class TreeParameters:
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS
 
-    def reach(self, q: FloatArray) -> FloatArray:
+    def reach(self, q: ArrayLike) -> FloatArray:
         """Return the path lengths from the root to the links at `q`.
 
         Returns:
             (..., joints) lengths (m). Each entry is the larger of the URDF's length and the table's length.
         """
+        q = self._parse(q)
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
         lengths = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
@@ -134,6 +136,12 @@ class TreeParameters:
             j = self.rows[j].antecedent
         return path
 
+    def _parse(self, q: ArrayLike) -> FloatArray:
+        array = as_finite(q, "q")
+        if array.shape[-1:] != (len(self.coordinates),):
+            raise InputError(f"q needs {len(self.coordinates)} numbers", found=f"shape {array.shape}")
+        return array
+
     def _values(self, q: FloatArray) -> FloatArray:
         column = {name: i for i, name in enumerate(self.coordinates)}
         values = np.zeros((*q.shape[:-1], len(self.rows)))
@@ -142,15 +150,13 @@ class TreeParameters:
                 values[..., j] = row.multiplier * q[..., column[row.mimicked_joint]] + row.offset
         return values
 
-    def placements(self, q: FloatArray) -> FloatArray:
+    def placements(self, q: ArrayLike) -> FloatArray:
         """Return the poses of all links. `q` has the order of `coordinates`.
 
         Returns:
             (..., joints, 4, 4) poses of the URDF link frames in the root frame.
         """
-        q = as_finite(q, "q")
-        if q.shape[-1:] != (len(self.coordinates),):
-            raise InputError(f"q needs {len(self.coordinates)} numbers", found=f"shape {q.shape}")
+        q = self._parse(q)
         with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
             return check_range(self._compute_placements(q))
 

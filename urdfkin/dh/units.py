@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from numbers import Real
+from typing import cast
 
 from urdfkin.errors import InputError
 from urdfkin.errors.numbers import UNIT_SHORT_NAMES, radians_from_degrees
-from urdfkin.errors.validators import safe_repr
+from urdfkin.errors.validators import as_int, safe_repr
 
 
 class AngleUnit(StrEnum):
@@ -36,6 +37,8 @@ class LengthUnit(StrEnum):
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
 _MAX_CELL_LENGTH = 200
+#: This number of digits distinguishes all doubles.
+_MAX_DIGITS = 17
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +48,7 @@ class Units:
     In radians, exact multiples of pi/12 become fractions of pi.
 
     Attributes:
-        digits: Significant digits.
+        digits: Significant digits, from 1 to 17.
         columns: Order of the printed columns.
     """
 
@@ -53,6 +56,23 @@ class Units:
     lengths: LengthUnit = LengthUnit.METRES
     digits: int = 10
     columns: tuple[str, ...] = COLUMNS
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "angles", AngleUnit(self.angles))
+            object.__setattr__(self, "lengths", LengthUnit(self.lengths))
+        except (ValueError, TypeError):
+            raise InputError(
+                "unknown unit",
+                where="angles or lengths",
+                found=f"{safe_repr(self.angles)}, {safe_repr(self.lengths)}",
+                remedy="write `radians` or `degrees` for angles, `metres` or `millimetres` for lengths",
+            ) from None
+        object.__setattr__(self, "digits", as_int(self.digits, "digits", 1, _MAX_DIGITS))
+        if not isinstance(self.columns, tuple | list) or sorted(map(str, self.columns)) != sorted(COLUMNS):
+            raise InputError(
+                f"columns must be {', '.join(COLUMNS)} in any order", found=safe_repr(self.columns)
+            )
 
     @property
     def uses_millimetres(self) -> bool:
@@ -98,16 +118,10 @@ class Units:
 
 def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
     """Return units from their names."""
-    try:
-        angles, lengths = (_UNIT_NAMES.get(name, name) for name in (angles, lengths))
-        return Units(AngleUnit(angles), LengthUnit(lengths), digits)
-    except (ValueError, TypeError):
-        raise InputError(
-            "unknown unit",
-            where="angles or lengths",
-            found=f"{angles!r}, {lengths!r}",
-            remedy="write `radians` or `degrees` for angles, `metres` or `millimetres` for lengths",
-        ) from None
+    angle, length = (
+        _UNIT_NAMES.get(name, name) if isinstance(name, str) else name for name in (angles, lengths)
+    )
+    return Units(cast("AngleUnit", angle), cast("LengthUnit", length), digits)
 
 
 def pi_fraction(radians: float) -> Fraction | None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
 from decimal import Decimal
 from numbers import Real
 from operator import index
-from typing import Any, TypeGuard
+from pathlib import Path
+from typing import Any, TypeGuard, TypeVar
 
 from urdfkin.errors import InputError
+
+_T = TypeVar("_T")
 
 
 def as_int(value: object, name: str, minimum: int, maximum: float = math.inf) -> int:
@@ -52,6 +56,8 @@ def float_or_infinity(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
+    except ValueError:  # A signalling NaN of `Decimal`.
+        return math.nan
 
 
 def as_str(value: object, name: str) -> str:
@@ -93,6 +99,29 @@ def as_bool(value: object, name: str) -> bool:
     if value is True or value is False:
         return value
     raise InputError(f"{name} must be True or False", found=safe_repr(value))
+
+
+def as_path(value: object, name: str) -> Path:
+    """Return `value` as a path.
+
+    >>> as_path(None, "path")
+    Traceback (most recent call last):
+    urdfkin.errors.InputError: path must be the path of a file or folder: found None
+    """
+    try:
+        text = os.fsencode(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        text = b""
+    if not text or b"\0" in text:
+        raise InputError(f"{name} must be the path of a file or folder", found=safe_repr(value))
+    return Path(os.fsdecode(text))
+
+
+def as_instance(value: object, kind: type[_T], name: str, remedy: str | None = None) -> _T:
+    """Return `value` if its type is `kind`."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name} must be a {kind.__name__}", found=safe_repr(value), remedy=remedy)
+    return value
 
 
 def safe_repr(value: object) -> str:

@@ -45,6 +45,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
+from urdfkin.errors.validators import as_bool, as_str
 from urdfkin.kinematics.inputs import (
     FloatArray,
     as_finite,
@@ -207,7 +208,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
     """Return theta-dot z (7.62), or 0 for a prismatic joint (7.63)."""
     w: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
-    return w if turns else np.zeros_like(w)
+    return w if as_bool(turns, "turns") else np.zeros_like(w)
 
 
 def interorigin_velocity(
@@ -224,7 +225,7 @@ def interorigin_velocity(
     """
     rotation: FloatArray = eq.tangential(as_vectors(w_0_i, "w_0_i"), as_vectors(d_vector, "d_vector"))
     sliding: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
-    return rotation if turns else rotation + sliding
+    return rotation if as_bool(turns, "turns") else rotation + sliding
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
@@ -238,7 +239,7 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
     The arm d_{i-1,n} leads from the joint's origin to the endpoint.
     """
     z, arm = np.broadcast_arrays(as_unit_vectors(z, "z"), as_vectors(arm, "arm"))
-    linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
+    linear, angular = eq.turning_column(z, arm) if as_bool(turns, "turns") else (z, np.zeros_like(z))
     return np.concatenate((linear, angular), axis=-1)
 
 
@@ -289,7 +290,11 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
+    return (
+        quaternion_of(R)
+        if as_str(representation, "representation") == QUATERNION
+        else euler_of(representation, R)
+    )
 
 
 def pose_rate_matrix(representation: str, R: ArrayLike) -> FloatArray:
@@ -297,7 +302,7 @@ def pose_rate_matrix(representation: str, R: ArrayLike) -> FloatArray:
 
     For a quaternion, Omega is 4 E^T, with E of 7.57.
     """
-    if representation == QUATERNION:
+    if as_str(representation, "representation") == QUATERNION:
         return _block_diagonal(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
     return _block_diagonal(euler_rate_matrix(representation, euler_of(representation, R)))
 
@@ -310,7 +315,7 @@ def pose_rate_inverse(
     For a quaternion, C (6, 7) has several right inverses (`C C^-1 = I`). The function returns the inverse
     that gives rates perpendicular to the quaternion.
     """
-    if representation == QUATERNION:
+    if as_str(representation, "representation") == QUATERNION:
         return _block_diagonal(quaternion_rate_matrix(quaternion_of(R)))
     return _block_diagonal(euler_rate_inverse(representation, euler_of(representation, R), nearest))
 

@@ -78,6 +78,31 @@ def common_batch_shape(shapes: Iterable[tuple[int, ...]], what: str = "the argum
         raise InputError(f"the batch shapes of {what} do not broadcast", found=found) from None
 
 
+def as_sample_index(sample: object, batch_shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the indices of a sample in a batch.
+
+    >>> as_sample_index([1], (3,))
+    (1,)
+    """
+    if isinstance(sample, tuple | list) and len(sample) == len(batch_shape):
+        are_integers = all(isinstance(i, int | np.integer) and not isinstance(i, bool) for i in sample)
+        if are_integers and all(-n <= i < n for i, n in zip(sample, batch_shape, strict=True)):
+            return tuple(map(int, sample))
+    raise InputError(
+        "no such configuration", found=safe_repr(sample), where=f"a batch of shape {batch_shape}"
+    )
+
+
+def as_rows(rows: object) -> slice:
+    """Return `rows` if it is a slice of whole numbers."""
+    try:
+        if isinstance(rows, slice) and rows.indices(6):
+            return rows
+    except (TypeError, ValueError):
+        pass
+    raise InputError("rows must be a slice", found=safe_repr(rows), remedy="write slice(0, 3)")
+
+
 def as_finite(value: ArrayLike, name: str) -> FloatArray:
     array = as_floats(value, name)
     if not np.isfinite(array).all():
@@ -99,6 +124,7 @@ def as_matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) ->
     return array
 
 
+@np.errstate(over="ignore")  # The norm is then inf.
 def as_unit_vectors(value: ArrayLike, name: str) -> FloatArray:
     array = as_vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))

@@ -53,7 +53,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
-from urdfkin.errors.validators import as_str
+from urdfkin.errors.validators import as_finite_float, as_str, safe_repr
 from urdfkin.kinematics.inputs import (
     FloatArray,
     as_finite,
@@ -61,6 +61,7 @@ from urdfkin.kinematics.inputs import (
     as_rotations,
     as_unit_vectors,
     as_vectors,
+    check_range,
 )
 from urdfkin.kinematics.number_kinds import array_equations as eq
 
@@ -79,7 +80,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
     Raise InputError if |S + S^T| / 2 > tolerance * |S|, where |.| is the largest absolute entry.
     """
-    S = as_matrices(S, "S")
+    S, tolerance = as_matrices(S, "S"), as_finite_float(tolerance, "tolerance")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
     symmetric = np.abs(S + S.swapaxes(-1, -2)).max(axis=(-1, -2), initial=0.0) / 2.0
     if (symmetric > tolerance * size).any():
@@ -196,6 +197,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
 NORM_TOLERANCE = 1e-6
 
 
+@np.errstate(over="ignore")  # The norm is then inf.
 def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
     quat = as_vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
@@ -262,7 +264,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     For the fixed frame, E is `1/2 [q0 I - S(q); -q^T]`. For the body frame, E is `1/2 [q0 I + S(q); -q^T]`.
     In both cases, `E^T E = I/4` and `E^T (q, q0) = 0`.
     """
-    if frame not in ("fixed", "body"):
+    if as_str(frame, "frame") not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
     quat = normalise_quaternions(quat)
     q, q0 = quat[..., :3], quat[..., 3]
@@ -296,6 +298,8 @@ def integrate_orientation(
     (rad/s), expressed in `frame`. Each jump of `w` must be at one of the `times`. The steps evaluate `w` only
     between the `times`.
     """
+    if not callable(w):
+        raise InputError("w must be a function of the time", found=safe_repr(w))
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
         found = f"shape {times.shape}"
@@ -371,15 +375,19 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return along, p - along
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation matrix of a rotation vector."""
+    """Return the rotation matrix of a rotation vector.
+
+    If the square of the angle is too large for double precision, the function raises RangeError.
+    """
     vector = as_vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
     # np.sinc(x) is sin(pi x) / (pi x), and 1 for x = 0.
     half = np.sinc(angle / (2.0 * np.pi))
     R: FloatArray = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
-    return R
+    return check_range(R)
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
@@ -627,7 +635,7 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def _refuse_singular(name: str, angles: FloatArray, nearest: float) -> None:
-    distance = singularity_distance(name, angles)
+    distance, nearest = singularity_distance(name, angles), as_finite_float(nearest, "nearest")
     if distance.size and distance.min() <= nearest:
         sample = np.unravel_index(distance.argmin(), distance.shape)
         raise RepresentationSingularityError(name, float(distance.min()), tuple(int(i) for i in sample))

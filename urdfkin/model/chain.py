@@ -58,7 +58,7 @@ class ChainJoint:
     mimic: Mimic | None = None
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class FrameChain(Displayable):
     """The moving joints from base to tip, and the constant poses between them.
 
@@ -194,7 +194,7 @@ class FrameChain(Displayable):
             (..., n + 1, 4, 4) poses in the base frame.
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number is not finite.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -207,7 +207,7 @@ class FrameChain(Displayable):
     def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the pose T_base_tip (..., 4, 4) for `q` (..., coordinates).
 
-        A wrong length of `q` raises InputError.
+        A wrong length of `q`, or a number that is not finite, raises InputError.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

@@ -1582,25 +1582,20 @@ class Robot(Displayable):
         """
         with import_lock:
             from urdfkin.dh.make import make_dh_table
-            from urdfkin.dh.table import DHTable
 
-        if not isinstance(like, DHTable | None):
-            raise InputError(
-                "like must be a table", found=safe_repr(like), remedy="read one with urdfkin.read_table(FILE)"
-            )
         table = make_dh_table(
             self.tree,
             as_choice(tip, self.tip_frame, "tip"),
             as_choice(base, self.base_frame, "base"),
-            as_str(convention, "convention"),
-            near_parallel=as_str(near_parallel, "near_parallel"),
+            convention,
+            near_parallel=near_parallel,
             snap=snap,
-            last=as_str(last, "last"),
-            parallel_offset=as_str(parallel_offset, "parallel_offset"),
-            flip=[as_str(joint, "each of flip") for joint in as_names(flip, "flip")],
-            first=as_str(first, "first"),
-            sign=as_str(sign, "sign"),
-            slide=as_str(slide, "slide"),
+            last=last,
+            parallel_offset=parallel_offset,
+            flip=flip,
+            first=first,
+            sign=sign,
+            slide=slide,
             like=like,
         )
         if self.verifier.resolve_policy(verify):

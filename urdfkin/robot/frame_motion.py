@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import as_str, safe_repr
+from urdfkin.errors.validators import as_instance, as_str, safe_repr
+from urdfkin.kinematics.inputs import as_rows
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -116,12 +117,14 @@ class FrameMotion:
     def singular_values_of(self, rows: slice) -> FloatArray:
         """Return the singular values (n, ...) of the given rows of the Jacobian, largest first.
 
+        If `rows` is not a slice, the method raises InputError.
+
         >>> import urdfkin
         >>> tip = urdfkin.frame_motion(urdfkin.load("planar_two_link"), [[[0.3, 1.0]]] * 3, "tip")
         >>> tip.singular_values_of(slice(0, 2)).round(4).tolist()
         [[0.865, 0.1946]]
         """
-        return np.asarray(np.linalg.svd(self.jacobian[:, rows], compute_uv=False), dtype=np.float64)
+        return np.asarray(np.linalg.svd(self.jacobian[:, as_rows(rows)], compute_uv=False), dtype=np.float64)
 
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
         """Return Yoshikawa's manipulability, the product of the singular values of the Jacobian J.
@@ -136,12 +139,15 @@ class FrameMotion:
         Returns:
             (n,) one value for each sample.
 
+        Raises:
+            InputError: `rows` is not a slice.
+
         >>> import urdfkin
         >>> tip = urdfkin.frame_motion(urdfkin.load("planar_two_link"), [[[0.3, 1.0]]] * 3, "tip")
         >>> tip.manipulability(slice(0, 2)).round(4).tolist()  # 0.5 * 0.4 * sin(1)
         [0.1683]
         """
-        part = self.jacobian[:, rows]
+        part = self.jacobian[:, as_rows(rows)]
         moving = self.active_entries[rows].any(axis=0)
         if not moving.any():
             return np.zeros(len(part))
@@ -177,8 +183,10 @@ def frame_motion(
     >>> tip.velocity[0].tolist(), tip.agrees
     ([0.0, 0.9, 0.0, 0.0, 0.0, 1.0], True)
     """
+    as_instance(robot, Robot, "robot", "call urdfkin.load")
     base = motion.base if isinstance(motion, Trajectory) else None
-    if not isinstance(motion, Trajectory | Iterable):
+    # An array without axes is an instance of Iterable.
+    if not isinstance(motion, Trajectory | Iterable) or getattr(motion, "ndim", 1) == 0:
         raise InputError("motion must be a trajectory, or q, v and a", found=safe_repr(motion))
     given = (motion.q, motion.v, motion.a) if isinstance(motion, Trajectory) else tuple(motion)
     if len(given) != len("qva"):

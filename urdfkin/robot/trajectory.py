@@ -42,7 +42,7 @@ from urdfkin.errors.numbers import (
     parse_quantity,
     radians_from_degrees,
 )
-from urdfkin.errors.validators import as_finite_float, as_int
+from urdfkin.errors.validators import as_finite_float, as_instance, as_int, as_path
 from urdfkin.kinematics.inputs import FloatArray, as_finite
 from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_from_quaternion
 from urdfkin.model.base_motion import BaseMotion
@@ -122,6 +122,8 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 #: Minimum number of samples. A second difference needs three samples.
 _MIN_SAMPLES = 3
+#: More samples do not fit in memory.
+_MAX_SAMPLES = 10**9
 #: Names of .npz arrays that describe the root link's motion.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 #: Maximum rounding error of times, divided by the smallest step.
@@ -196,6 +198,12 @@ class Trajectory:
         )
 
 
+def _check_robot(robot: object) -> None:
+    from urdfkin.robot import Robot
+
+    as_instance(robot, Robot, "robot", "call urdfkin.load")
+
+
 def make_line_trajectory(
     robot: Robot, start: ConfigurationLike, end: ConfigurationLike, duration: float, samples: int
 ) -> Trajectory:
@@ -210,8 +218,9 @@ def make_line_trajectory(
             is a batch; a number is not finite.
         RangeError: the duration is so short that an acceleration is not a finite double.
     """
+    _check_robot(robot)
     duration = as_finite_float(duration, "the duration")
-    samples = as_int(samples, "samples", 0)
+    samples = as_int(samples, "samples", 0, _MAX_SAMPLES)
     if duration <= 0.0 or samples < _MIN_SAMPLES:
         raise InputError(
             f"a line trajectory needs a duration above 0 s and at least {_MIN_SAMPLES} samples",
@@ -280,8 +289,9 @@ def read_trajectory(
     >>> motion.q[2].round(4).tolist(), motion.v[1].round(4).tolist(), motion.rates_source
     ([0.3142, 1.0], [1.5708, 0.0], 'by central differences')
     """
+    _check_robot(robot)
     conversion = None if convention is None else robot.convention(convention)
-    return complete_rates(robot.tree, read_samples(robot, Path(path), conversion))
+    return complete_rates(robot.tree, read_samples(robot, as_path(path, "path"), conversion))
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:

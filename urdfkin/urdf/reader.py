@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.errors.validators import as_str
 from urdfkin.kinematics.rotation import coordinate_rotation, rotation_from_quaternion, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
@@ -32,8 +33,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
     tree = build_tree(
         name, find_root_link(name, urdf.links, urdf.joints), make_joint_rows(urdf.joints, mimic=mimic)
     )
-    if root_joint not in (None, "floating", "planar"):
-        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))
+    check_root_joint(root_joint)
     return tree if root_joint is None else with_root_joint(tree, JointKind(root_joint))
 
 
@@ -129,3 +129,8 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
             offset = rule.multiplier * end.offset + rule.offset
             end = resolved[name] = Mimic(end.mimicked_joint, rule.multiplier * end.multiplier, offset)
     return resolved
+
+
+def check_root_joint(root_joint: object) -> None:
+    if root_joint is not None and as_str(root_joint, "root_joint") not in ("floating", "planar"):
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))

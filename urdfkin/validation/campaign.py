@@ -14,7 +14,6 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
@@ -22,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.compiled.preload import all_kernels_on_disk
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import as_bool, as_int, as_str, safe_repr
+from urdfkin.errors.validators import as_bool, as_int, as_path, as_str, safe_repr
 from urdfkin.validation import memory
 from urdfkin.validation.answer import Answer, Failure, make_failure, make_unexpected_failure
 from urdfkin.validation.chunk import Chunking
@@ -119,14 +118,15 @@ def validate(
     >>> report.passed, report.robots[0].failed
     (True, 0)
     """
-    samples, seed = as_int(samples, "samples", 0), as_int(seed, "seed", 0)
+    samples, seed = as_int(samples, "samples", 0, _MAX_SAMPLES), as_int(seed, "seed", 0)
     jobs, isolate = as_int(jobs, "jobs", 1), as_bool(isolate, "isolate")
     shard = None if shard is None else as_str(shard, "shard")
     if retry is not None and as_str(retry, "retry") != "failed":
         raise InputError(
             "unknown value of `retry`", found=f"retry={retry!r}", remedy='give retry="failed" or None'
         )
-    folder = None if store is None else _as_folder(store)
+    _check_objects(xacro_args, executor, progress)
+    folder = None if store is None else as_path(store, "store")
     if (retry or shard is not None) and store is None:
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     sources = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
@@ -188,16 +188,15 @@ def validate(
     )
 
 
-def _as_folder(store: str | os.PathLike[str]) -> Path:
-    try:
-        name = os.fsencode(store)
-    except (TypeError, ValueError):
-        name = b""
-    if not name or b"\0" in name:
+def _check_objects(xacro_args: object, executor: object, progress: object) -> None:
+    if not isinstance(xacro_args, Mapping | None):
+        raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
+    if not (executor is None or isinstance(executor, Executor) or hasattr(executor, "run")):
         raise InputError(
-            "`store` must be the path of a folder", found=safe_repr(store), remedy="give the path of a folder"
+            "`executor` must be an executor, as in `concurrent.futures`", found=safe_repr(executor)
         )
-    return Path(os.fsdecode(name))
+    if not (progress is None or callable(progress)):
+        raise InputError("`progress` must be a function", found=safe_repr(progress))
 
 
 def _can_be_loaded(robot_input: RobotInput) -> bool:
@@ -216,7 +215,7 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
         SourceError: The folder has no manifest, or the manifest cannot be read.
         InputError: The manifest is not valid, or has another version.
     """
-    store = Store.open_read_only(Path(folder), _warn)
+    store = Store.open_read_only(as_path(folder, "folder"), _warn)
     store.check_names()
     manifest, robot_inputs = store.manifest, store.manifest.make_robot_inputs()
     collector = ResultCollector(
@@ -247,6 +246,8 @@ def _read_studies(
     return tuple(None if isinstance(study, FailedStudy) else study for study in studies), None not in studies
 
 
+#: The number of chunks of all robots must fit in an index of Python.
+_MAX_SAMPLES = 10**15
 #: Numbers of samples above which kernels save time.
 #: Kernels on disk need _WORTH_LOADING samples.
 #: Missing kernels need _WORTH_COMPILING samples.

@@ -20,12 +20,21 @@ import numpy as np
 
 from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.errors.validators import as_bool, as_finite_float, as_int, safe_repr
+from urdfkin.errors.validators import (
+    as_bool,
+    as_choice,
+    as_finite_float,
+    as_instance,
+    as_int,
+    as_str,
+    safe_repr,
+)
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.configuration import draw_samples
 from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
 from urdfkin.system.documents import as_json_data
 from urdfkin.validation.diagnosis import DiagnosisCase, Mistakes, as_tuple, diagnose
 from urdfkin.verify.bounds import broadcast_k
@@ -37,10 +46,11 @@ from urdfkin.verify.verifier import Verifier, compute_bound, compute_oracle_resu
 
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Conversion
-    from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
 _BATCH_SIZE = 256
+#: More samples do not fit in memory.
+_MAX_SAMPLES = 10**9
 _DIAGNOSIS_SAMPLES = 48
 _MAX_MESSAGES = 5
 #: Largest relative difference that single precision can cause.
@@ -55,7 +65,7 @@ class FunctionError:
     message: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WorstResult:
     """The result with the largest ratio of difference to bound.
 
@@ -311,7 +321,8 @@ def verify_function(
             found=safe_repr(function),
             remedy="give a function that takes q, or q, v and a",
         )
-    row = quantity_of(quantity)
+    as_instance(robot, Robot, "robot", "call urdfkin.load")
+    row = quantity_of(as_str(quantity, "quantity"))
     if row.object_kind != "frames" or row is ACCELERATION_BREAKDOWN:
         raise InputError(
             "urdfkin cannot check functions that compute this quantity",
@@ -322,9 +333,9 @@ def verify_function(
         function,
         robot,
         row,
-        robot.tip_frame if frame is None else frame,
+        as_choice(frame, robot.tip_frame, "frame"),
         None if not row.has_reference else Reference.of(reference),
-        as_int(samples, "samples", 0),
+        as_int(samples, "samples", 0, _MAX_SAMPLES),
         as_int(seed, "seed", 0),
         as_finite_float(factor, "factor"),
         as_bool(batch, "batch"),

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 from urdfkin.dh.parse_table import is_table_file
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, OracleError, UrdfkinError
+from urdfkin.errors.numbers import parse_float, parse_quantity
+from urdfkin.errors.validators import float_or_infinity
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load, make_robot
 from urdfkin.urdf.catalogue import catalogue, find_description
@@ -142,7 +144,15 @@ def _as_texts(xacro_args: Mapping[str, object] | None) -> tuple[tuple[str, str],
 def _as_numbers(lock: str | Mapping[str, ArrayLike]) -> tuple[tuple[str, float], ...]:
     """Return the locks with one number, for the command of a robot that cannot be loaded."""
     values = lock.items() if isinstance(lock, Mapping) else ()
-    return tuple((name, float(value)) for name, value in values if isinstance(value, int | float | str))
+    numbers = ((name, _as_number(value)) for name, value in values)
+    return tuple((name, number) for name, number in numbers if number is not None)
+
+
+def _as_number(value: object) -> float | None:
+    if isinstance(value, str):
+        quantity = parse_quantity(value)
+        return parse_float(value) if quantity is None else quantity.value
+    return float_or_infinity(value) if isinstance(value, int | float) else None
 
 
 def make_robot_input(

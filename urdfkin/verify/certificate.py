@@ -12,6 +12,7 @@ from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import json_text, log_line
+from urdfkin.errors.validators import as_path
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import Count, DocumentKind, Header, NonNegativeFloat, as_json_data, doc
 from urdfkin.system.files import expand_home, write_file
@@ -226,7 +227,7 @@ class Certificate(Displayable):
         ...     path.exists()
         True
         """
-        write_file(expand_home(path), (json_text(self.as_dict()) + "\n").encode())
+        write_file(expand_home(as_path(path, "path")), (json_text(self.as_dict()) + "\n").encode())
 
     def _text_document(self) -> TextDocument:
         heads = ("quantity", "checked", "not checked", "worst [eps*scale]", "of the bound")

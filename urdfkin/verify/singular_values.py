@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.inputs import as_finite, as_sample_index
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
@@ -129,11 +129,11 @@ class SingularValues(Displayable):
         The axes of joints joint_1 and joint_2 lie in one plane with the origin of tip.
         """
         shape = self.values.value.shape[:-1]
-        exists = len(sample) == len(shape) and all(-n <= i < n for i, n in zip(sample, shape, strict=True))
-        if not exists or self.frame_jacobian is None:
+        index = as_sample_index(sample, shape)
+        if self.frame_jacobian is None:
             raise InputError("no such configuration", found=str(sample), where=f"a batch of shape {shape}")
-        bounds = self.values.lower[sample], self.values.upper[sample]
-        return explain_singularity(self.frame_jacobian, sample, self.rows, *bounds)
+        bounds = self.values.lower[index], self.values.upper[index]
+        return explain_singularity(self.frame_jacobian, index, self.rows, *bounds)
 
     @cached_property
     def manipulability(self) -> BoundedArray:

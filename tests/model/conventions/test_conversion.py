@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -209,6 +210,28 @@ def test_an_output_array_does_not_change_the_result(dog: Robot) -> None:
         expected = method(*inputs, "trunk")
         out = np.empty((*expected.shape[:-1], dog.nv))
         assert np.array_equal(method(*inputs, "trunk", out=out), expected)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("quaternion", "WXYZ"), ("continuous", "2"), ("continuous", True), ("base_v", None),
+        ("angle", "degrees"),
+        ("six_vectors", "Angular first"), ("order", 1), ("joints", "abc"), ("rules", {"FL_hip_joint": 3}),
+    ],
+)  # fmt: skip
+def test_a_convention_refuses_an_unknown_value(key: str, value: Any) -> None:
+    # Some of these values were once ignored.
+    with pytest.raises(InputError, match=f"convention mujoco: `{key}` must"):
+        replace(find_convention("mujoco"), **{key: value})
+
+
+@pytest.mark.parametrize(
+    "rule", [{"sign": 0.0}, {"sign": 2}, {"zero": math.nan}, {"unit": "furlong"}, {"unit": 0}]
+)
+def test_a_joint_rule_refuses_an_unknown_value(rule: dict[str, Any]) -> None:
+    with pytest.raises((InputError, UnknownNameError), match=next(iter(rule))):
+        JointRule(**rule)
 
 
 def test_equal_conventions_make_no_copy() -> None:

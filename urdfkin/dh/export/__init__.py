@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError
+from urdfkin.errors.validators import as_bool, as_instance, as_str
 from urdfkin.system.lazy_import import get_hook
 
 if TYPE_CHECKING:
@@ -41,12 +42,17 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
     Only printed tables use `units`. With `verify`, Pinocchio checks numeric code.
 
     Raises:
+        InputError: an argument has a wrong type.
         UnknownNameError: the format does not exist.
     """
-    if format not in FORMATS:
+    from urdfkin.dh.table import as_table
+
+    table, verify = as_table(table), as_bool(verify, "verify")
+    units = Units() if units is None else as_instance(units, Units, "units", "call parse_units")
+    if as_str(format, "format") not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
     module, _ = FORMATS[format]
     if not module:
         return str(get_hook("code in a language")(get_hook("code of a chain")(table, verify=verify), format))
     write = getattr(importlib.import_module(module), "write_" + format.replace("-", "_"))
-    return cast("str", write(table, units or Units()) if module == _TEXT_MODULE else write(table))
+    return cast("str", write(table, units) if module == _TEXT_MODULE else write(table))

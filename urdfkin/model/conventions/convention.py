@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.errors.validators import is_real, safe_repr
+from urdfkin.errors.validators import float_or_infinity, is_real, safe_repr
 from urdfkin.system.files import abbreviate_path, may_exist, read_text
 
 #: Factors that convert rad or m to each unit.
@@ -69,12 +69,19 @@ class JointRule:
         zero: The other program's value for the joint value 0.
         unit: Name of the unit ("rad", "deg", "turn", "m" or "mm"), or the number of units in one turn.
             None means the convention's unit, and `factor` is None.
+
+    Raises:
+        InputError: an attribute has an invalid value.
+        UnknownNameError: there is no such unit.
     """
 
     name: str | None = None
     sign: float = 1.0
     zero: float = 0.0
     unit: str | float | None = None
+
+    def __post_init__(self) -> None:
+        _check_rule(self.name, self.sign, self.zero, self.unit, "JointRule")
 
     @property
     def factor(self) -> float | None:
@@ -99,6 +106,9 @@ class Convention:
     Attributes:
         joints: Names of the joints in order. Only the order "given" uses these names.
         rules: Rules of single joints, by the joint's name in the URDF.
+
+    Raises:
+        InputError: an attribute has an invalid value.
     """
 
     name: str
@@ -122,6 +132,17 @@ class Convention:
     measurement: str = ""
     sources: tuple[str, ...] = ()
     note: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"convention {_as_text(self.name, 'name', 'Convention')}"
+        for key in _CHOICES:
+            _check_choice(key, getattr(self, key), where)
+        if not isinstance(self.joints, tuple | list) or not all(isinstance(x, str) for x in self.joints):
+            raise InputError("`joints` must be a list of names", where=where, found=safe_repr(self.joints))
+        if not isinstance(self.rules, Mapping) or not all(
+            isinstance(rule, JointRule) for rule in self.rules.values()
+        ):
+            raise InputError("`rules` must map names to JointRule", where=where, found=safe_repr(self.rules))
 
     @property
     def angle_factor(self) -> float:
@@ -197,11 +218,16 @@ def parse_convention(text: str, where: str, name: str) -> Convention:
     for key, value in entries.items():
         if key not in _CHOICES:
             raise UnknownNameError("key", key, (*_CHOICES, "like", "joints", "joint", "title"), where=where)
-        if value not in _CHOICES[key]:
-            words = ", ".join(map(str, _CHOICES[key]))
-            raise InputError(f"`{key}` must be one of: {words}", where=where, found=safe_repr(value))
+        _check_choice(key, value, where)
         changes[key] = value
     return replace(base, **changes)
+
+
+def _check_choice(key: str, value: object, where: str) -> None:
+    choices = _CHOICES[key]
+    if isinstance(value, bool) or not isinstance(value, type(choices[0])) or value not in choices:
+        words = ", ".join(map(str, choices))
+        raise InputError(f"`{key}` must be one of: {words}", where=where, found=safe_repr(value))
 
 
 def check_unique(names: Sequence[str], where: str) -> None:
@@ -217,34 +243,43 @@ def _as_text(value: object, key: str, where: str) -> str:
 
 
 def _as_number(value: object, key: str, where: str) -> float:
-    if not is_real(value) or not math.isfinite(value):
+    if not is_real(value) or not math.isfinite(number := float_or_infinity(value)):
         raise InputError(f"`{key}` must be a finite number", where=where, found=safe_repr(value))
-    return float(value)
+    return number
 
 
 def _parse_rule(rule: dict[str, Any], where: str) -> JointRule:
     for key in rule:
         if key not in ("name", "sign", "zero", "unit"):
             raise UnknownNameError("key", key, ("name", "sign", "zero", "unit"), where=where)
-    name = _as_text(rule["name"], "name", where) if "name" in rule else None
-    sign = _as_number(rule.get("sign", 1), "sign", where)
-    if abs(sign) != 1.0:
-        raise InputError("`sign` must be 1 or -1", where=where, found=safe_repr(rule["sign"]))
-    zero = _as_number(rule.get("zero", 0.0), "zero", where)
+    _check_rule(rule.get("name"), rule.get("sign", 1), rule.get("zero", 0.0), rule.get("unit"), where)
     unit = rule.get("unit")
+    return JointRule(
+        rule.get("name"),
+        float(rule.get("sign", 1)),
+        float(rule.get("zero", 0.0)),
+        unit if unit is None or isinstance(unit, str) else float(unit),
+    )
+
+
+def _check_rule(name: object, sign: object, zero: object, unit: object, where: str) -> None:
+    if name is not None:
+        _as_text(name, "name", where)
+    if abs(_as_number(sign, "sign", where)) != 1.0:
+        raise InputError("`sign` must be 1 or -1", where=where, found=safe_repr(sign))
+    _as_number(zero, "zero", where)
     if isinstance(unit, str):
         if unit not in _UNITS:
             raise UnknownNameError("unit", unit, _UNITS, where=where)
     elif unit is not None:
-        unit = _as_number(unit, "unit", where)
-        if not _SMALLEST_UNIT <= unit <= 1.0 / _SMALLEST_UNIT:
+        number = _as_number(unit, "unit", where)
+        if not _SMALLEST_UNIT <= number <= 1.0 / _SMALLEST_UNIT:
             raise InputError(
                 f"`unit` must be a positive number from {_SMALLEST_UNIT:g} to {1.0 / _SMALLEST_UNIT:g}",
                 where=where,
-                found=safe_repr(unit),
+                found=safe_repr(number),
                 remedy="write the number of units in one turn, for example 360 for degrees",
             )
-    return JointRule(name, sign, zero, unit)
 
 
 def as_toml(convention: Convention) -> str:

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
-from urdfkin.errors.validators import safe_repr
+from urdfkin.errors.validators import as_int, as_str, safe_repr
 from urdfkin.kinematics.inputs import as_finite, as_floats, check_range, common_batch_shape
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
@@ -361,6 +361,8 @@ class Conversion:
 
     def layout(self, symbol: str) -> CoordinateLayout:
         """Return names and units of the target program's "q", "v" or "a"."""
+        if as_str(symbol, "symbol") not in ("q", "v", "a"):
+            raise UnknownNameError("symbol", symbol, "qva")
         if symbol != "q":
             rest = {"neutral": np.zeros(self.nv)}
             units = tuple(rate.unit for rate in self._rates)
@@ -422,7 +424,7 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a to the target program's convention.
 
-        If q is equal in both conventions, the result can be the array q itself.
+        If q, v or a is equal in both conventions, the result can be the given array itself.
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
@@ -462,6 +464,8 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a from the target program's convention.
 
+        If q, v or a is equal in both conventions, the result can be the given array itself.
+
         Raises:
             InputError: A length is wrong, or a number is not finite.
                 A mimic joint's value contradicts its rule.
@@ -475,8 +479,8 @@ class Conversion:
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
-        given = zip((q, v, a), "qva", strict=True)
-        inputs = [self._check_target(x, symbol) for x, symbol in given if x is not None]
+        inputs = [self._check_target(q, "q")]
+        inputs += [self._check_target(x, symbol) for symbol, x in (("v", v), ("a", a)) if x is not None]
         common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         with np.errstate(over="ignore", invalid="ignore"):
             results = [configuration.with_unit_quaternions(self.tree, self._from_target_q(inputs[0]))]
@@ -487,11 +491,14 @@ class Conversion:
         results = list(map(check_range, results))
         return results[0] if len(results) == 1 else tuple(results)
 
-    def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
-        if values[1] is None and values[2] is not None:
+    def _parse_inputs(
+        self, q: ConfigurationLike, v: ConfigurationLike | None, a: ConfigurationLike | None
+    ) -> list[FloatArray]:
+        if v is None and a is not None:
             raise InputError("`a` can only be converted together with `v`")
-        letters = zip("qva", values, strict=True)
-        inputs = [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
+        inputs = [configuration.parse_finite(self.tree, q, "q")]
+        rates = [(letter, x) for letter, x in (("v", v), ("a", a)) if x is not None]
+        inputs += [configuration.parse_finite(self.tree, x, letter) for letter, x in rates]
         common_batch_shape((x.shape[:-1] for x in inputs), "q, v and a")
         return inputs
 
@@ -632,8 +639,9 @@ class Conversion:
         Returns:
             (..., program's nv, nv) matrix.
         """
-        configurations, velocities = self._parse_inputs(q, v, None)
-        shape = np.broadcast_shapes(configurations.shape[:-1], velocities.shape[:-1])
+        configurations = configuration.parse_finite(self.tree, q, "q")
+        velocities = configuration.parse_finite(self.tree, v, "v")
+        shape = common_batch_shape((configurations.shape[:-1], velocities.shape[:-1]), "q and v")
         M_rate = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
             own = slice(block.v_index, block.v_index + block.joint.kind.nv)
@@ -707,6 +715,7 @@ class Conversion:
         [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
         """
         array = as_floats(x, "six-vectors")
+        axis = as_int(axis, "axis", -max(1, array.ndim), max(1, array.ndim) - 1)
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
         return np.take(array, _ANGULAR_FIRST, axis) if self.angular_first else array

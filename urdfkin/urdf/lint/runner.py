@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import as_bool, as_str, safe_repr
+from urdfkin.errors.validators import as_bool, safe_repr
 from urdfkin.urdf.findings import Finding, Findings, Reporter
 from urdfkin.urdf.lint.pages import CODE_BY_NAME
 from urdfkin.urdf.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
@@ -30,6 +30,7 @@ from urdfkin.urdf.lint.rules.joints import (
     check_suspicious,
 )
 from urdfkin.urdf.parser import read_document, read_robot
+from urdfkin.urdf.reader import check_root_joint
 from urdfkin.urdf.records import DEFAULT_SIZE_LIMITS, RobotRecord, SizeLimits
 from urdfkin.urdf.sources import Source, UrdfText, read_source
 
@@ -82,7 +83,7 @@ def check(
     if mimic is not None:
         as_bool(mimic, "mimic")
     if root_joint is not None:
-        as_str(root_joint, "root_joint")
+        check_root_joint(root_joint)
     as_bool(fold, "fold")
     if not isinstance(limits, SizeLimits):
         raise InputError("limits must be SizeLimits(...)", found=safe_repr(limits))
