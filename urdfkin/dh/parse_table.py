@@ -602,10 +602,11 @@ def suggest_published_tables(robot: str) -> list[str]:
 
 def reference_path(name: str) -> Path:
     """`name` is a path or a published table's name."""
-    path = Path(name)
+    path, files = Path(name), published_tables()
+    if not name:
+        raise SourceError("the path is empty", remedy=f"give a file, or one of {', '.join(files)}")
     if path.suffix or may_exist(path):
         return path
-    files = published_tables()
     if name not in files:
         raise UnknownNameError("reference table", name, files)
     return files[name]
