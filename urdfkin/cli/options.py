@@ -543,13 +543,13 @@ def read_batch(
     """
     import numpy as np
 
-    from urdfkin.robot.trajectory import count_cells, read_columns
+    from urdfkin.robot.trajectory import first_cells, read_columns
 
     if not file:
         raise SourceError("the path is empty", where=option, remedy="give a CSV file after @")
     path = Path(file)
     text = _read_stdin() if file == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
-    width = count_cells(text, str(path)) if len(layouts) > 1 else None
+    width = len(first_cells(text, str(path))) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
     rows = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
