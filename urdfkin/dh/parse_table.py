@@ -260,7 +260,10 @@ def _parse_separated(lines: list[str]) -> _Grid | None:
 
 
 def _split_csv_line(line: str, separator: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    except csv.Error:  # A cell has more characters than the limit of the module csv.
+        return [line]
 
 
 def _parse_aligned(lines: list[str]) -> _Grid | None:
