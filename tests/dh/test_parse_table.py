@@ -463,7 +463,9 @@ def test_a_csv_file_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
         ("a;alpha;d;theta;beta\n0;0;0;0;q1\n", "row 1, beta: beta must not contain a joint variable"),
         ("a;alpha;d;theta;lower [m]\n0;0;0;q1;1\n", "row 1, lower: lower must be an angle: found '1 m'"),
         ("a;alpha;d;theta\n1.000,5;0;0;0\n", "'.5' is not understood"),
-        pytest.param(f"a,alpha,d,theta\n{'1' * 200_000},0,0,0\n", "row 1: a row needs a cell", id="long cell"),
+        pytest.param(
+            f"a,alpha,d,theta\n{'1' * 200_000},0,0,0\n", "row 1: a row needs a cell", id="long cell"
+        ),
         ("# convention: modified\na,alpha,d,theta\n1,0,0,0\n", "different values: found 'standard' and 'mod"),
         *(
             (f"joint,a,alpha,d,theta\nj1,1,0,0,0\n{line}j3,2,0,0,0\n", "row 2: a row of the table is below")
