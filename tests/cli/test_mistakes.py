@@ -36,6 +36,8 @@ MISTAKES = {
     "placement ur5 --q @": "--q: the path is empty; give a CSV file after @",
     "velocity ur5 --base-velocity @": "--base-velocity: the path is empty",
     "placement ur5 --convention ''": "unknown convention ''",
+    "info a.xacro --xacro-arg L:=1 --xacro-arg L:=2": "'L' has two values: '1' and '2'",
+    "info a.usda --variant size=small --variant size=big": "'size' has two values",
     "validate ur5 --html a.out --json ./a.out": "two options write the same file, 'a.out'",
     "same ur5 ur5 --markdown a.md --output a.md": "two options write the same file, 'a.md'; name two files",
     "verify a.py ur5 --junit a.md -o a.md": "two options write the same file, 'a.md'",

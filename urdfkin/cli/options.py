@@ -154,12 +154,13 @@ def _make_pair_reader(
     separator: str, form: str, *, needs_value: bool
 ) -> Callable[[Sequence[str]], dict[str, str]]:
     def read_pairs(words: Sequence[str]) -> dict[str, str]:
-        pairs = {}
+        pairs = dict[str, str]()
         for word in words:
             name, found, value = word.partition(separator)
             if not found or not name or (needs_value and not value):
                 raise click.BadParameter(f"{word!r} is not {form}")
-            pairs[name] = value
+            if pairs.setdefault(name, value) != value:
+                raise click.BadParameter(f"{name!r} has two values: {pairs[name]!r} and {value!r}")
         return pairs
 
     return read_pairs
