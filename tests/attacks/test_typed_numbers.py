@@ -70,6 +70,8 @@ FILES = [
     ("a,b,c,d,e,f\n0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
     (f"{NAMES},more\n0,0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
     (f"{NAMES},more\n0,0,0,0,0,0,0\n", "found unknown: more;"),
+    (f"{NAMES},\n0,0,0,0,0,0,\n", "found unknown: '';"),
+    (f'{NAMES}\n0,0,0,0,0,0\n   \n""\n', "q.csv:4: 6 numbers are expected"),
     (NAMES.replace(",elbow_joint", "") + "\n0,0,0,0,0\n", "found missing: elbow_joint;"),
     (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; duplicate: wrist_1_"),
     (f"{NAMES}\n0,0,0,0,0,0,0\n", f"q.csv:2: 6 numbers are expected ({NAMES.replace(',', ', ')}): found 7"),

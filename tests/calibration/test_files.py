@@ -61,6 +61,17 @@ def test_every_format_of_measured_poses_is_read_equally(tmp_path: Path) -> None:
         np.testing.assert_allclose(found, T, atol=1e-15)
 
 
+@pytest.mark.parametrize("before", ["", "\ufeff", "  # one, two\n", '"# one, two"\n', "  \n\n"])
+def test_quoted_headings_comments_and_empty_lines_do_not_hide_the_columns_of_matrices(
+    before: str, tmp_path: Path
+) -> None:
+    names = ["a", "b", *(f"T{i}{j}" for i in range(4) for j in range(4))]
+    header = before + ",".join(f'"{name}"' for name in names)
+    q, found = read_poses(csv(tmp_path / "T.csv", header, np.hstack([Q, T.reshape(3, 16)])), NAMES, NAMES)
+    assert (q == Q).all()
+    np.testing.assert_allclose(found, T, atol=1e-15)
+
+
 def test_a_quaternion_with_few_digits_is_normalised(tmp_path: Path) -> None:
     quat = quaternion_of(T[:, :3, :3])
     rows = np.hstack([quat * 1.0009, T[:, :3, 3], Q])

@@ -63,6 +63,22 @@ def test_any_pose_of_the_instrument_and_of_the_target_is_identified(full_poses: 
     assert np.linalg.norm(present(rough.tool)[:3, 3] - X[:3, 3]) < 0.02
 
 
+def test_a_target_far_from_the_tip_is_identified_from_positions() -> None:
+    true = bench("panda", ("origins",), "panda_hand", "panda_link0", poses=40)
+    B, X = pose(1, 4.0), pose(51, 3.0)
+    found = true.calibrate((B @ true.T @ X)[:, :3, 3], fit=[*ENDS, "origins"])
+    assert present(found.full_fit).rms()[0] < 1e-13
+
+
+def test_a_fixed_joint_at_the_base_of_a_path_from_child_to_parent_is_identified() -> None:
+    true = bench("ur5", ("origins",), "tool0", "base_link")
+    found = calibrate(true.robot, true.q, np.linalg.inv(true.T), tip="base_link", base="tool0")
+    assert present(found.full_fit).rms()[0] < 1e-13
+    forward = true.calibrate()
+    assert found.identification.rank == forward.identification.rank
+    assert set(found.origins) == set(forward.origins)
+
+
 def test_joints_named_base_and_tool_are_not_confused_with_the_base_and_the_tool() -> None:
     text = BRANCHED.replace('"three"', '"base"').replace('"four"', '"tool"')
     true = bench(text, ("origins",), "hand", "trunk")

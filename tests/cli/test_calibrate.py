@@ -27,6 +27,7 @@ def words_of(folder: Path, shift: int = 0) -> tuple[list[str], Any]:
 
 def test_calibrate_writes_a_urdf_and_prints_data(tmp_path: Path) -> None:
     (words, true), out = words_of(tmp_path), tmp_path / "new.urdf"
+    assert "--output writes a URDF; use" in refused(*words, "-o", f"{tmp_path}/new.toml")
     done = good(*words, "--format", "json", "-o", str(out))
     assert done.data["rank"] == 14
     assert sum(one["fitted"] for one in done.data["parameters"]) == 14
@@ -64,7 +65,9 @@ def test_the_calibration_of_a_table_file_writes_a_table(tmp_path: Path) -> None:
     (tmp_path / "arm.toml").write_text(export(drawn, "toml"))
     np.savez(tmp_path / "poses.npz", q=q, T=model.chain.poses(q, truth))
     out = tmp_path / "new.toml"
-    good("calibrate", f"{tmp_path}/arm.toml", "--poses", f"{tmp_path}/poses.npz", "-o", str(out))
+    words = "calibrate", f"{tmp_path}/arm.toml", "--poses", f"{tmp_path}/poses.npz"
+    assert "--output writes a table as TOML; use" in refused(*words, "-o", f"{tmp_path}/new.csv")
+    good(*words, "-o", str(out))
     assert np.abs(read_table(out).placement(q) - model.chain.poses(q, truth)).max() < 1e-13
 
 

@@ -174,6 +174,19 @@ def test_the_cells_of_a_modified_first_row_that_the_base_compensates_are_listed(
     assert found.not_compared == ((0, "a"), (0, "alpha"), (0, "d"), (5, "d"))
 
 
+@pytest.mark.parametrize("fit", [True, False])
+@pytest.mark.parametrize("cell", ["a", "alpha"])
+def test_a_wrong_cell_of_a_modified_first_row_is_named_without_a_fit(cell: str, fit: bool) -> None:
+    path, table = published("ur5")
+    modified = to_convention(table, "modified")
+    wrong = with_cells(modified, 0, **{cell: getattr(modified.rows[0], cell) + 0.05})
+    found = compare(path, wrong, fit=fit)
+    named = found.unfitted_differences if fit else found.differences
+    assert [(one.row, one.cell) for one in named] == [(0, cell)]
+    assert named[0].difference == pytest.approx(-0.05)
+    assert found.residual < 1e-11
+
+
 def test_a_table_of_a_different_robot_differs() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     found = compare(make_chain(elbow(), "tip"), other)

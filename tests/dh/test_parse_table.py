@@ -417,6 +417,7 @@ NULL = '{"convention": "standard", "robot": null, "rows": [[0.1, 0, 0, 0]]}'
         ("rows = [", ".toml", ": not valid TOML"),
         ("", ".xls", "must have the suffix .toml, .json, .csv, .tsv"),
         (NULL, ".json", "robot: a name must be text: found None"),
+        ('{"rows": [{"a": 1, "d": 0, "a": 2}]}', ".json", ": not valid JSON: found the key 'a' occurs twice"),
         pytest.param("[" * 200_000, ".json", ": not valid", id="deep JSON"),
         pytest.param(f"rows = {'[' * 20_000}", ".toml", ": not valid", id="deep TOML"),
     ],
@@ -461,6 +462,15 @@ def test_a_csv_file_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
         ("a;alpha;d;theta;offset\n0;0;0;0;q1\n", "row 1, offset: offset must be a number in the unit of"),
         ("a;alpha;d;theta;beta\n0;0;0;0;q1\n", "row 1, beta: beta must not contain a joint variable"),
         ("a;alpha;d;theta;lower [m]\n0;0;0;q1;1\n", "row 1, lower: lower must be an angle: found '1 m'"),
+        ("a;alpha;d;theta\n1.000,5;0;0;0\n", "'.5' is not understood"),
+        pytest.param(
+            f"a,alpha,d,theta\n{'1' * 200_000},0,0,0\n", "row 1: a row needs a cell", id="long cell"
+        ),
+        ("# convention: modified\na,alpha,d,theta\n1,0,0,0\n", "different values: found 'standard' and 'mod"),
+        *(
+            (f"joint,a,alpha,d,theta\nj1,1,0,0,0\n{line}j3,2,0,0,0\n", "row 2: a row of the table is below")
+            for line in ("\n", "# remark\n", "\n\n# remark\n", '"a\nb",0,0,0,0\n', "a\u2028b,0,0,0,0\n")
+        ),
     ],
 )
 def test_an_error_in_a_csv_table_is_reported_with_position_and_reason(

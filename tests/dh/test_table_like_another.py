@@ -161,6 +161,19 @@ def test_a_minimal_prismatic_row_has_a_equal_to_zero() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("slide", ["drawn", "minimal"])
+@pytest.mark.parametrize("kinds", ["PRRR", "RRPRRR", "RRRRPR"])
+def test_a_table_like_another_may_have_other_positions_of_prismatic_axes(kinds: str, slide: str) -> None:
+    # In the first arm, the second and third axes are parallel, and no two others.
+    square = rotation("x", math.pi / 2)
+    steps = [shift(0.1, 0.2, 0.3) @ square, shift(0.3, 0.2, 0.1), shift(0.4, 0.3, 0.1) @ square]
+    tree = elbow(kinds) if kinds != "PRRR" else arm(shift(0.1, 0, 0), *steps, kinds=kinds)
+    reference = make_dh_table(tree, "tip", slide={"drawn": "minimal", "minimal": "drawn"}[slide])
+    table = make_dh_table(tree, "tip", like=reference, slide=slide)
+    q = configurations(len(kinds))
+    np.testing.assert_allclose(table.placement(q), make_chain(tree, "tip").placement(q), atol=1e-13)
+
+
 def test_columns_are_printed_in_the_requested_order() -> None:
     result = good("dh ur5 --like ur5 --columns alpha,a,d,theta --snap 1e-6 --degrees")
     lines = [line.split() for line in result.text.splitlines()]

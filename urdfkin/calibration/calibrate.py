@@ -57,7 +57,7 @@ from urdfkin.model.configuration import parse_finite
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import as_robot, load
-from urdfkin.robot.trajectory import read_arrays, read_columns
+from urdfkin.robot.trajectory import first_cells, read_arrays, read_columns
 from urdfkin.system.files import MAX_DATA_BYTES, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
@@ -666,9 +666,7 @@ def _read_csv_poses(
     default_q: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     text, where = read_text(path, MAX_DATA_BYTES, pipes=True), str(path)
-    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-    names = {cell.strip() for cell in first.split(",")}
-    kind = _MATRIX_COLUMNS if "T00" in names else _POSITION_COLUMNS
+    kind = _MATRIX_COLUMNS if "T00" in first_cells(text, where) else _POSITION_COLUMNS
     pose_rest = _QUATERNION_COLUMNS if kind is _POSITION_COLUMNS else _LAST_ROW_COLUMNS
     if ambiguous := [name for name in required_coordinates if name in (*kind, *pose_rest)]:
         raise InputError(

@@ -17,7 +17,7 @@ and Mooring, 1987):
 | tip, only positions measured | orientation of the tool | 3 of 6 |
 
 Orthogonal elimination chooses the fitted parameters of the base, then of the tool, then of each joint from
-base to tip. Each parameter has a column in the Jacobian.
+base to tip. A fixed joint comes last. Each parameter has a column in the Jacobian.
 
     remainder of a column: the column minus its projection onto the chosen columns
     length of the remainder: independence from the chosen columns
@@ -68,6 +68,8 @@ Let only positions be measured, and let base and target be unknown. The module r
 
 1. Solve for R_B at the last value of x.
 2. Solve for x and b at this R_B. These equations are linear.
+
+The first x is 0. If the error stays large, the repetition begins again with other rotations R_B.
 """
 
 from __future__ import annotations
@@ -511,6 +513,12 @@ def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
 _MAX_START_REPETITIONS = 200
 #: Relative change of the target's position at which iterations end.
 _TARGET_CONVERGENCE = 1e-9
+#: The repetition can end at a local minimum.
+#: One cause is a target far from the tip of a small arm.
+#: So the repetition also starts at these rotations of the base.
+_START_ROTATIONS = tuple(np.diag(x) for x in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]))
+#: Error of start values without another start, relative to the spread of the positions.
+_SMALL_START_ERROR = 0.01
 #: Maximum ratio: spread of measured positions / tip positions.
 #: Positions in millimetres give a ratio of about 1000.
 _MAX_SPREAD_RATIO = 100.0
@@ -560,9 +568,29 @@ def _from_poses(
 
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
+    if not (base and tool):
+        return _repeat_from_positions(T, p, base, tool, None)
+    enough = _SMALL_START_ERROR * float(np.linalg.norm(p - p.mean(axis=0)))
+    best, least = (np.eye(4), np.eye(4)), math.inf
+    for R_B in (None, *_START_ROTATIONS):
+        B, X = _repeat_from_positions(T, p, base, tool, R_B)
+        error = float(np.linalg.norm(p - (B @ T @ X)[:, :3, 3]))
+        if error < least:
+            best, least = (B, X), error
+        if least <= enough:
+            break
+    return best
+
+
+def _repeat_from_positions(
+    T: FloatArray, p: FloatArray, base: bool, tool: bool, R_B: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Solve for base and tool. Without the start rotation `R_B`, the target is first at the tip."""
     B, X = np.eye(4), np.eye(4)
-    for _ in range(_MAX_START_REPETITIONS if base and tool else 1):
-        if base:
+    for k in range(_MAX_START_REPETITIONS if base and tool else 1):
+        if k == 0 and R_B is not None:
+            B[:3, :3] = R_B
+        elif base:
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
             B[:3, :3] = _nearest_rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()

@@ -11,9 +11,13 @@ value of a joint. A joint can have a gain g:
     D              derivative of the tip's pose by this angle or length
     q D            derivative of the tip's pose by g
 
-**URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip has the same six parameters. Other fixed joints have no parameters. A later joint's
-parameters have the same effect (on a path from parent to child).
+**URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint at
+an end of the path has the same six parameters in two cases:
+
+- directly before the tip
+- directly after the base, if the path leads from child to parent
+
+Other fixed joints have no parameters. Parameters of a moving joint have the same effect.
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis
@@ -355,8 +359,10 @@ class _ModelBuilder:
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
         # Only joint parameters are nearly known before the fit.
         # So base and tool come first.
+        # A fixed joint comes last, as on a path from parent to child.
         owners = sorted(
-            dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]
+            dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters),
+            key=lambda one: (not one[1], one[0] not in path.coupling.joints),
         )
         groups = tuple(
             tuple(
@@ -379,7 +385,9 @@ def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[st
     steps = joints_between(tree, tip, base)
     for i, (joint, backwards) in enumerate(steps):
         A = axis_pose(joint)
-        only = _parameters_to_fit(fit, joint, is_last=i == len(steps) - 1)
+        # Parameters of a moving joint act on its parent's side.
+        is_end = i == len(steps) - 1 or (i == 0 and backwards)
+        only = _parameters_to_fit(fit, joint, is_end=is_end)
         if backwards:
             builder.steps.append(A)
             if joint.kind.has_axis:
@@ -404,8 +412,8 @@ def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[st
     return builder.build(tree, path, (base, tip), preferences)
 
 
-def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_last: bool) -> Collection[str]:
-    if "origins" in fit and (joint.kind.has_axis or is_last):
+def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_end: bool) -> Collection[str]:
+    if "origins" in fit and (joint.kind.has_axis or is_end):
         return _ORIGIN_PARAMETER_NAMES
     own = "rz" if joint.kind.turns else "z"
     return (own,) if "offsets" in fit and joint.kind.has_axis else ()

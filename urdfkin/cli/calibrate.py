@@ -138,6 +138,7 @@ def calibrate_command(
     calibration, written = None, None
     with report_compilation():
         if ur is not None:
+            _check_suffix(output, is_table=False)
             written = _factory_calibration(loaded, ur, order)
         else:
             calibration = _fit(context, loaded)
@@ -208,6 +209,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     tip, base = options["tip"], options["base"]
     table = read_table_or_screws(options["robot"]) if is_table_file(options["robot"]) else None
     source = table if isinstance(table, DHTable) else robot
+    _check_suffix(options["output"], is_table=source is not robot)
     if source is not robot:
         # The fit uses the table, so robot options are rejected.
         unused = "mimic", "root_joint", "lock", "joints", "convention"
@@ -247,6 +249,15 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
             radians=options["radians"],
             write_all=options["write_all"],
         )
+
+
+def _check_suffix(output: Path | None, *, is_table: bool) -> None:
+    """A file with a wrong suffix could not be read again."""
+    suffix = "" if output is None else output.suffix.lower()
+    if is_table and suffix not in ("", ".toml"):
+        raise InputError("--output writes a table as TOML", where=str(output), remedy="use the suffix .toml")
+    if not is_table and suffix == ".toml":
+        raise InputError("--output writes a URDF", where=str(output), remedy="use the suffix .urdf")
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:

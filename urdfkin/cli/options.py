@@ -154,12 +154,13 @@ def _make_pair_reader(
     separator: str, form: str, *, needs_value: bool
 ) -> Callable[[Sequence[str]], dict[str, str]]:
     def read_pairs(words: Sequence[str]) -> dict[str, str]:
-        pairs = {}
+        pairs = dict[str, str]()
         for word in words:
             name, found, value = word.partition(separator)
             if not found or not name or (needs_value and not value):
                 raise click.BadParameter(f"{word!r} is not {form}")
-            pairs[name] = value
+            if pairs.setdefault(name, value) != value:
+                raise click.BadParameter(f"{name!r} has two values: {pairs[name]!r} and {value!r}")
         return pairs
 
     return read_pairs
@@ -521,7 +522,7 @@ def _read_values(
             raise InputError(problem, where=where, found=f"N = {n}", remedy=remedy) from None
         return conversion.to(drawn) if conversion else drawn
     if text.startswith("@"):
-        return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]
+        return read_batch(text[1:], where, (names,), column_units(robot, letter, conversion))[0]
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     return layout.parse(text, where)[None]
 
@@ -534,7 +535,7 @@ def _read_count(where: str, text: str) -> int:
 
 
 def read_batch(
-    path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
+    file: str, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample per line.
 
@@ -543,10 +544,13 @@ def read_batch(
     """
     import numpy as np
 
-    from urdfkin.robot.trajectory import count_cells, read_columns
+    from urdfkin.robot.trajectory import first_cells, read_columns
 
-    text = _read_stdin() if str(path) == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
-    width = count_cells(text, str(path)) if len(layouts) > 1 else None
+    if not file:
+        raise SourceError("the path is empty", where=option, remedy="give a CSV file after @")
+    path = Path(file)
+    text = _read_stdin() if file == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
+    width = len(first_cells(text, str(path))) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
     rows = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
@@ -628,7 +632,7 @@ def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tupl
     from urdfkin.robot.trajectory import parse_numbers
 
     if text.startswith("@"):
-        return read_batch(Path(text[1:]), option, layouts)
+        return read_batch(text[1:], option, layouts)
     cells = text.split(",")
     names = next((names for names in layouts if len(names) == len(cells)), layouts[0])
     return np.array([parse_numbers(cells, option, names)]), names

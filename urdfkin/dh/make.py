@@ -81,7 +81,8 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
             unique = max(unique, abs(angle_difference(row.alpha, other.alpha)), a * is_unique)
             shiftable = max(shiftable, abs(row.beta - other.beta), a)
         if 0 < i < n - 1 and row.kind.turns:
-            unique = max(unique, abs(row.d - other.d) / reach)
+            d = abs(row.d - other.d) / reach
+            unique, shiftable = max(unique, d * _has_unique_offset(table, i)), max(shiftable, d)
         elif 0 < i < n - 1:
             shiftable = max(shiftable, theta)
         zeros += (theta > _SAME_ANGLE_TOLERANCE) + (row.d * other.d < 0.0)
@@ -91,6 +92,19 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
     )
     power = math.ceil(math.log10(max(unique, shiftable, _MIN_CELL_DIFFERENCE)))
     return round(unique, 2), power, zeros, ends, sum(row.sense < 0 for row in table.rows)
+
+
+def _has_unique_offset(table: DHTable, i: int) -> bool:
+    """Return whether d of a revolute row is independent of the positions of prismatic axes.
+
+    A prismatic axis can move to any parallel line. Any row of parallel axes can contain their offset.
+    """
+    rows, first, last = table.rows, i, i
+    while first > 0 and abs(math.sin(rows[first - 1].alpha)) <= _SAME_ANGLE_TOLERANCE:
+        first -= 1
+    while last < len(rows) - 1 and abs(math.sin(rows[last].alpha)) <= _SAME_ANGLE_TOLERANCE:
+        last += 1
+    return all(row.kind.turns for row in rows[max(first - 1, 0) : last + 2])
 
 
 def make_dh_table(

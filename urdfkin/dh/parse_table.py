@@ -15,6 +15,7 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -168,9 +169,27 @@ def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: s
             end = len(lines)
         if any(_parse_columns(split(other)) for other in lines[end:]):
             raise _second_table_error(line)
+        below = next((other for other in lines[end + 1 :] if other.strip() and not other.startswith("#")), "")
+        if _is_row(split(below), columns):
+            raise InputError(
+                "a row of the table is below the end of the table",
+                where=f"row {len(rows) + 1}",
+                found=safe_repr(below.strip()),
+                remedy="remove the empty line, the comment or the line break in a name above this row",
+            )
         others, decimal_commas = [*lines[:k], *lines[end:]], separator in (";", "\t", "|")
         return _Grid(columns, rows, others, decimal_commas, separator == ",")
     return None
+
+
+def _is_row(cells: list[str], columns: tuple[_Column, ...]) -> bool:
+    if len(cells) != len(columns):
+        return False
+    numbers = [cell for column, cell in zip(columns, cells, strict=True) if column.name in COLUMNS]
+    try:
+        return all(parse_cell(_COMMA.sub(".", cell)) for cell in numbers)
+    except InvalidCellError:
+        return False
 
 
 def _second_table_error(heading: str) -> InputError:
@@ -241,7 +260,10 @@ def _parse_separated(lines: list[str]) -> _Grid | None:
 
 
 def _split_csv_line(line: str, separator: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    except csv.Error:  # A cell has more characters than the limit of the module csv.
+        return [line]
 
 
 def _parse_aligned(lines: list[str]) -> _Grid | None:
@@ -310,10 +332,15 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
     data: dict[str, Any] = {}
     for line in lines:
         if found := pattern.match(line.strip()):
-            try:
-                data[found[1]] = json.loads(found[2])
-            except ValueError:
-                data[found[1]] = found[2].rstrip(" ;,\t").strip("\"'")
+            value: Any = found[2].rstrip(" ;,\t").strip("\"'")
+            with suppress(ValueError):
+                value = json.loads(found[2])
+            if data.setdefault(found[1], value) != value:
+                raise InputError(
+                    "two lines state different values",
+                    where=found[1],
+                    found=f"{safe_repr(data[found[1]])} and {safe_repr(value)}",
+                )
     return data
 
 
@@ -414,7 +441,12 @@ def _add_unit(original: str, column: _Column, where: str, grid: _Grid) -> str:
     try:
         cell = parse_cell(text)
     except InvalidCellError as error:
-        problem = "separate cells by semicolons if commas are decimal" if "," in original else f"{error}"
+        is_comma_separated = grid.rejects_unknown_columns
+        problem = (
+            "separate cells by semicolons if commas are decimal"
+            if "," in original and is_comma_separated
+            else f"{error}"
+        )
         raise InputError(
             "this is not a number",
             where=where,
@@ -573,6 +605,14 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
     return data
 
 
+def _as_mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"the key {next(key for key in keys if keys.count(key) > 1)!r} occurs twice")
+    return data
+
+
 def _is_markup(path: Path) -> bool:
     try:
         return read_text(path.expanduser()).lstrip().startswith("<")
@@ -582,7 +622,7 @@ def _is_markup(path: Path) -> bool:
 
 _PARSERS_BY_SUFFIX: dict[str, Callable[[str], Any]] = {
     ".toml": partial(tomllib.loads, parse_float=NumberWithText),
-    ".json": partial(json.loads, parse_float=NumberWithText),
+    ".json": partial(json.loads, parse_float=NumberWithText, object_pairs_hook=_as_mapping),
     **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), find_table_in_text),
 }
 
@@ -603,10 +643,11 @@ def suggest_published_tables(robot: str) -> list[str]:
 
 def reference_path(name: str) -> Path:
     """`name` is a path or a published table's name."""
-    path = Path(name)
+    path, files = Path(name), published_tables()
+    if not name:
+        raise SourceError("the path is empty", remedy=f"give a file, or one of {', '.join(files)}")
     if path.suffix or may_exist(path):
         return path
-    files = published_tables()
     if name not in files:
         raise UnknownNameError("reference table", name, files)
     return files[name]

@@ -24,7 +24,7 @@ _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*[^\x00-\x7f].*", "write ASCII digits and signs"),
-    (r".*_.*", "write the digits without underscores"),
+    (r"[-+]?[0-9.]+_.*", "write the digits without underscores"),
     (r"0[xXbBoO].*", "write the number in decimal digits"),
     (r".*;.*", "separate numbers by commas"),
 )

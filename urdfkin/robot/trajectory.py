@@ -576,9 +576,9 @@ def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
-def count_cells(text: str, where: str) -> int:
-    """Return the number of cells in the first line, except empty lines and comments; 0 for none."""
-    return len(next(_rows(text, where), (0, []))[1])
+def first_cells(text: str, where: str) -> Sequence[str]:
+    """Return the cells of the first line, except empty lines and comments; none without such a line."""
+    return next(_rows(text, where), (0, []))[1]
 
 
 def parse_numbers(
@@ -605,7 +605,9 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         for row in reader:
-            if row and not row[0].lstrip().startswith("#"):
+            # A line of blanks is empty; the line `""` has an empty cell.
+            is_empty = not row or (len(row) == 1 and row[0].isspace())
+            if not is_empty and not row[0].lstrip().startswith("#"):
                 yield reader.line_num, [cell.strip() for cell in row]
     except csv.Error as error:
         raise InputError("not valid CSV", where=f"{where}:{reader.line_num}", found=str(error)) from None
@@ -635,7 +637,11 @@ def _check_columns(
         raise InputError(
             f"the first line must name the columns of {what}",
             where=where,
-            found="; ".join(f"{word}: {join_names(found)}" for word, found in wrong.items() if found),
+            found="; ".join(
+                f"{word}: {join_names([name or repr(name) for name in found])}"
+                for word, found in wrong.items()
+                if found
+            ),
             remedy=f"name the columns {join_names(required)}{also}",
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,11 +79,13 @@ def compare(
     targets, check_targets = _sample_targets(chain)
     written = TableArrays.of(standard)
     fitted = fit_model(chain, standard, targets) if fit else written
-    corrected = fit_cells(fitted, targets, _cell_mask(reference), free=fit)
+    unfitted = _make_unfitted_cells(reference, written, targets, check_targets)
+    compared = _ComparedCells(fitted, targets, check_targets) if fit else unfitted
+    corrected = fit_cells(compared.model, compared.targets, _cell_mask(reference, compared.model), free=fit)
     metres, radians = check_targets.largest_errors(fitted)
     unfitted_metres, unfitted_radians = check_targets.largest_errors(written)
-    residual = check_targets.largest_errors(corrected)[0]
-    cells = _find_differences(chain, reference, fitted, corrected, check_targets, half_digits, fit)
+    residual = compared.check_targets.largest_errors(corrected)[0]
+    cells = _find_differences(chain, reference, compared, corrected, half_digits, fit)
     table = _make_fitted_table(chain, standard, fitted)
     metres_bound, radians_bound = max_tip_error_bound(chain, table)
     comparison = TableComparison(
@@ -120,7 +122,7 @@ def compare(
         return replace(comparison, mistakes=mistakes, differences=cells if len(mistakes) == 1 else ())
     if not fit:
         return comparison
-    cells = _find_differences_without_fit(chain, reference, written, targets, check_targets, half_digits)
+    cells = _find_differences_without_fit(chain, reference, unfitted, half_digits)
     few = len(cells) <= len(comparison.differences) + _MAX_MORE_UNFITTED_CELLS
     return replace(comparison, unfitted_differences=cells if few else ())
 
@@ -202,18 +204,53 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
     return AbsorbedOffset(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
 
 
+@dataclass(frozen=True, slots=True)
+class _ComparedCells:
+    """A standard table and the poses that its cells must reproduce."""
+
+    model: TableArrays
+    targets: TargetPoses
+    check_targets: TargetPoses
+
+
+def _make_unfitted_cells(
+    reference: DHTable, written: TableArrays, targets: TargetPoses, check_targets: TargetPoses
+) -> _ComparedCells:
+    """Return the table without a fit.
+
+    For a modified table, a first row without a joint contains a, alpha and beta of the reference's first row.
+    Otherwise, the base would contain these cells.
+    """
+    if reference.convention is not DHConvention.MODIFIED:
+        return _ComparedCells(written, targets, check_targets)
+    first = reference.rows[0]
+    model = TableArrays(
+        np.vstack([[0.0, 0.0, first.a, first.alpha, first.beta], written.cells]),
+        np.append(1.0, written.turns),
+        np.append(0.0, written.senses),
+        reference.base,
+        written.tool,
+    )
+
+    def with_first_value(one: TargetPoses) -> TargetPoses:
+        return replace(one, values=np.hstack([np.zeros((len(one.values), 1)), one.values]))
+
+    return _ComparedCells(model, with_first_value(targets), with_first_value(check_targets))
+
+
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
     """Return the reference's row index for a cell of standard row i.
 
     In a modified table, row i + 1 contains a, alpha and beta. None: no row contains the cell.
+    Row -1 is the first row of `_make_unfitted_cells`.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
-    return reference_index if reference_index < len(reference.rows) else None
+    return reference_index if 0 <= reference_index < len(reference.rows) else None
 
 
-def _cell_mask(reference: DHTable) -> FloatArray:
+def _cell_mask(reference: DHTable, model: TableArrays) -> FloatArray:
     """Return a mask (n, 5): 1 for cells in the reference, else 0."""
-    rows = range(len(reference.rows))
+    rows = range(len(reference.rows) - len(model.cells), len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
     )
@@ -241,22 +278,22 @@ def _find_compensated_cells(
 def _find_differences(
     chain: FrameChain,
     reference: DHTable,
-    fitted: TableArrays,
+    compared: _ComparedCells,
     corrected: TableArrays,
-    check_targets: TargetPoses,
     half_digits: HalfDigits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
     """Return differing cells, largest effect first."""
+    fitted, check_targets = compared.model, compared.check_targets
     cell_derivatives, scale = tip_poses_and_derivatives(fitted, check_targets)[2], check_targets.scale
     linear = cell_derivatives.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
     largest = np.linalg.norm(linear, axis=1).max(axis=0)
-    differences = []
+    first, differences = len(fitted.cells) - len(reference.rows), []
     for i, row in enumerate(fitted.cells):
         for k, cell in enumerate(CELLS):
             change = float(corrected.cells[i, k] - row[k])
             size = abs(change) * (1.0 if cell in ("a", "d") else scale)
-            reference_index = _reference_row_index(reference, i, cell)
+            reference_index = _reference_row_index(reference, i - first, cell)
             if (
                 reference_index is None
                 or (free and k == fitted.variable_indices[i])
@@ -276,17 +313,15 @@ def _find_differences(
 def _find_differences_without_fit(
     chain: FrameChain,
     reference: DHTable,
-    written: TableArrays,
-    targets: TargetPoses,
-    check_targets: TargetPoses,
+    unfitted: _ComparedCells,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
     """The result is empty if no change of cells removes the tip error."""
-    corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
-    metres, radians = check_targets.largest_errors(corrected)
-    if metres > NEGLIGIBLE_ERROR * targets.scale or radians > NEGLIGIBLE_ERROR:
+    corrected = fit_cells(unfitted.model, unfitted.targets, _cell_mask(reference, unfitted.model), free=False)
+    metres, radians = unfitted.check_targets.largest_errors(corrected)
+    if metres > NEGLIGIBLE_ERROR * unfitted.targets.scale or radians > NEGLIGIBLE_ERROR:
         return ()
-    return _find_differences(chain, reference, written, corrected, check_targets, half_digits, False)
+    return _find_differences(chain, reference, unfitted, corrected, half_digits, False)
 
 
 def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> DHTable:

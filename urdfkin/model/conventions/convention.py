@@ -178,7 +178,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
     if (known := _load_built_in().get(str(name))) is not None:
         return known
     path = Path(name)
-    if path.suffix == ".toml" or may_exist(path):
+    if path.suffix == ".toml" or (name != "" and may_exist(path)):
         return parse_convention(read_text(path), abbreviate_path(path), path.stem)
     error = UnknownNameError("convention", str(name), BUILT_IN_NAMES)
     names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
