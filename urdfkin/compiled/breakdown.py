@@ -210,11 +210,10 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
-        own = (
-            joint.T_parent_joint[:3, 3]
-            + _joint_translation(joint, q[:, at:]) @ joint.T_parent_joint[:3, :3].T
-        )
-        levers[:, k] = (Rs[:, k] @ own[..., np.newaxis])[..., 0] + levers[:, k + 1]
+        R, d = joint.T_parent_joint[:3, :3], joint.T_parent_joint[:3, 3]
+        # A product of two matrices would have other bits for a batch than for one configuration.
+        own = d + eq.rotate(R, _joint_translation(joint, q[:, at:]))
+        levers[:, k] = eq.rotate(Rs[:, k], own) + levers[:, k + 1]
     return levers
 
 
