@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import urdfkin
 from tests.cli.running import urdfkin as command
@@ -28,6 +29,7 @@ from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.exact.numbers import precision, read_exact_joints
 from urdfkin.verify.quantities import VELOCITY
+from urdfkin.verify.singular_values import singular_values
 
 #: A robot with joints of each kind and two mimic joints.
 ODD = robot_of(
@@ -214,6 +216,91 @@ def test_a_hessian_with_a_subnormal_and_a_large_multiplier_is_verified(small: fl
     for reference in ("local", "world", "local_world_aligned"):
         assert np.isfinite(robot.hessian([1e-12, 0.4], "e", reference)).all()
     assert robot.certificate().verified
+
+
+def sliders(*multipliers: float) -> str:
+    """Write a robot with three mimic joints along x, y and z, which mimic joints of other branches."""
+    joints = [joint(f"x{i}", "prismatic", "base", f"side{i}", more=limit()) for i in range(3)]
+    joints.append(joint("turn", "continuous", "base", "arm0", axis="1 0 0"))
+    for i, (axis, multiplier) in enumerate(zip(("1 0 0", "0 1 0", "0 0 1"), multipliers, strict=True)):
+        more = limit() + mimic(f"x{i}", multiplier)
+        joints.append(joint(f"m{i}", "prismatic", f"arm{i}", f"arm{i + 1}", axis=axis, more=more))
+    return robot_of(*joints)
+
+
+def test_a_hessian_without_large_products_is_verified_for_large_multipliers() -> None:
+    """The product of two multipliers overflows, but the derivative of a sliding column by a slide is 0."""
+    robot = loaded(sliders(1e200, 1e200, 1e200))
+    for reference in REFERENCES:
+        assert np.isfinite(robot.hessian([0.0, 0.0, 0.0, 0.3], "arm3", reference)).all()
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-320, 1e-200, 1e-170, 1.0, 1e155, 1e200])
+def test_the_sign_of_a_quaternion_at_half_a_turn_may_differ_for_columns_of_any_size(size: float) -> None:
+    """At half a turn, qw is 0. Rounding decides the sign of q and of all its derivatives."""
+    generator = np.random.default_rng(0)
+    for _ in range(30):
+        half_turn = math.pi * (axis := generator.normal(size=3)) / np.linalg.norm(axis)
+        roll, pitch, yaw = Rotation.from_rotvec(half_turn).as_euler("xyz")
+        robot = loaded(
+            robot_of(
+                joint("x", "continuous", "a", "b"),
+                joint(
+                    "y", "continuous", "a", "c", f'rpy="{roll} {pitch} {yaw}"', "0.6 0 0.8", mimic("x", size)
+                ),
+            )
+        )
+        assert np.isfinite(robot.analytical_jacobian([0.0], "c", "quaternion")).all()
+
+
+def test_a_singular_value_beyond_the_largest_double_raises_range_error() -> None:
+    with pytest.raises(RangeError, match="a singular value"):
+        singular_values(np.full((3, 3), 1e308), np.zeros((3, 3)), np.ones(3, dtype=bool))
+
+
+def test_a_gradient_of_the_manipulability_beyond_the_largest_double_raises_range_error() -> None:
+    robot, q = loaded(sliders(1e200, 1e200, 1e200)), [0.0, 0.0, 0.0, 0.3]
+    found = robot.singular_values(q, "arm3", "linear")
+    assert (found.values.lower > 0.0).all()
+    with pytest.raises(RangeError, match="the gradient"):
+        found.manipulability_gradient(robot.hessian(q, "arm3"))
+
+
+def test_the_manipulability_of_a_motion_is_a_number_if_partial_products_overflow() -> None:
+    robot = loaded(sliders(1e200, 1e200, 1e-300))
+    motion = urdfkin.frame_motion(robot, (np.zeros((1, 4)),) * 3, "arm3")
+    assert motion.manipulability(slice(0, 3)).tolist() == [0.0]
+
+
+def test_the_breakdown_of_a_batch_has_the_bits_of_single_calls() -> None:
+    robot = loaded(
+        robot_of(
+            joint("x", "planar", "a", "b", 'rpy="0.3 0.2 0.1"'),
+            joint("y", "floating", "b", "c", 'rpy="0.3 0.2 0.1"', ""),
+            joint("z", "prismatic", "c", "d", 'rpy="0.3 0.2 0.1"', "0.6 0 0.8", limit()),
+            joint("w", "continuous", "d", "e", 'xyz="0.1 0.2 0.3"', "0.6 0 0.8"),
+        )
+    )
+    q, (v, a) = robot.sample(20), np.random.default_rng(0).normal(size=(2, 20, robot.nv))
+    for reference in REFERENCES:
+        batch = robot.acceleration_breakdown(q, v, a, "e", reference)
+        for i, row in enumerate(zip(q, v, a, strict=True)):
+            alone = robot.acceleration_breakdown(*row, "e", reference)
+            assert alone.terms.tobytes() == batch.terms[i].tobytes()
+            assert alone.total.tobytes() == batch.total[i].tobytes()
+
+
+def test_a_bound_beyond_the_largest_double_is_no_disagreement_of_a_motion() -> None:
+    """For the same inputs, `acceleration` raises RangeError too."""
+    robot = loaded(chain([""] * 2))
+    q, v = np.zeros((2, 2)), np.array([[1.0, 1.0], [6e153, 6e153]])
+    assert urdfkin.frame_motion(robot, (q[:1], v[:1], q[:1]), "l2").agrees
+    v = np.array([[1.0, 1.0], [1.5e154, -1.5e154]])
+    with pytest.raises(RangeError):
+        robot.acceleration(q, v, q, "l2")
+    with pytest.raises(RangeError, match=r"sample \[1\]"):
+        urdfkin.frame_motion(robot, (q, v, q), "l2")
 
 
 # -- results beyond the largest number -------------------------------------------------------------

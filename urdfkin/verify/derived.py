@@ -44,7 +44,12 @@ def derive_analytical_jacobian(
         theirs = quaternion_jacobian(quat, J_v)
         # q and -q are the same rotation, and results have qw >= 0.
         # Both signs are accepted if |qw| is below the rounding error.
-        opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
+        # Products of very small or very large numbers would leave the range of doubles.
+        with np.errstate(over="ignore"):
+            same, other = (
+                np.abs(x)[..., 3:, :].max(axis=(-2, -1), initial=0.0) for x in (ours - theirs, ours + theirs)
+            )
+        opposite = other < same
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
