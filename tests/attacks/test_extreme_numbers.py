@@ -19,7 +19,7 @@ from urdfkin.compiled import breakdown
 from urdfkin.compiled.breakdown import AccelerationBreakdown
 from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
-from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMAL
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
@@ -271,6 +271,33 @@ def test_the_manipulability_of_a_motion_is_a_number_if_partial_products_overflow
     robot = loaded(sliders(1e200, 1e200, 1e-300))
     motion = urdfkin.frame_motion(robot, (np.zeros((1, 4)),) * 3, "arm3")
     assert motion.manipulability(slice(0, 3)).tolist() == [0.0]
+
+
+@pytest.mark.filterwarnings("error")
+def test_tables_and_chains_report_invalid_numbers_and_results_beyond_the_largest_double() -> None:
+    near = 'xyz="0.3 0.1 0.2" rpy="1 0.2 0.3"'
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", near, more=limit()),
+            joint("y", "prismatic", "b", "c", near, "0 0.6 0.8", limit()),
+            joint("z", "continuous", "c", "d", near, more=mimic("y", 1e10)),
+        )
+    )
+    path = robot.chain("d", "a")
+    functions: list[Callable[[Any], Any]] = [path.frames, path.placement, path.coupling.values]
+    functions += [robot.dh("d", "a").placement, robot.dh("d", "a").frames, robot.screws("d", "a").placement]
+    for function in [*functions, lambda q: robot.tree_parameters().placements(np.array(q))]:
+        assert np.isfinite(function([1e100, 0.1])).all()
+        with pytest.raises(RangeError, match="a result"):
+            function([1.7e308, 1.7e308])
+        for bad in (math.nan, math.inf):
+            with pytest.raises(InputError, match="q must be finite"):
+                function([0.1, bad])
+
+
+def test_the_text_of_a_chain_contains_a_very_distant_tip() -> None:
+    robot = loaded(chain([""], origin='xyz="1e300 0.1 0"'))
+    assert "the tip is at (1e+300, 0.1, 0)" in str(robot.chain("l1", "l0"))
 
 
 def test_the_breakdown_of_a_batch_has_the_bits_of_single_calls() -> None:

@@ -31,6 +31,7 @@ from urdfkin.dh.units import Units, parse_units
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.mimic import Coupling, make_coupling
@@ -546,6 +547,7 @@ class DHTable(Displayable):
 
     # -- placement -----------------------------------------------------------------------------------
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
@@ -554,7 +556,8 @@ class DHTable(Displayable):
                 text). None means the zero configuration.
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -564,7 +567,7 @@ class DHTable(Displayable):
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
         constants = np.array([row.theta if row.kind.turns else row.d for row in self.rows])
         senses = np.array([row.sense for row in self.rows])
-        return self._path.frames(constants + senses * values)[..., ::2, :, :]
+        return check_range(self._path.frames(constants + senses * values)[..., ::2, :, :])
 
     @cached_property
     def _path(self) -> Path:
@@ -576,6 +579,7 @@ class DHTable(Displayable):
             steps += [motion, constant @ row.X] if standard else [row.X @ constant, motion]
         return Path(tuple(steps))
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose T_base_tip, the product of base, rows and tool.
 
@@ -584,7 +588,8 @@ class DHTable(Displayable):
                 text).
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         Example:
             >>> import math
@@ -593,7 +598,7 @@ class DHTable(Displayable):
             >>> arm.placement([math.pi / 2])[:3, 3].round(12).tolist()
             [0.0, 2.0, 0.0]
         """
-        return np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool)
+        return check_range(np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool))
 
 
 def _check_pose(T: ArrayLike, where: str) -> FloatArray:

@@ -42,7 +42,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
-from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.inputs import as_finite, check_range
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
@@ -142,11 +142,16 @@ class TreeParameters:
                 values[..., j] = row.multiplier * q[..., column[row.mimicked_joint]] + row.offset
         return values
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the poses of all links. `q` has the order of `coordinates`.
 
         Returns:
             (..., joints, 4, 4) poses of the URDF link frames in the root frame.
+
+        Raises:
+            InputError: `q` has the wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
         """
         q = as_finite(q, "q")
         if q.shape[-1:] != (len(self.coordinates),):
@@ -160,7 +165,7 @@ class TreeParameters:
             if row.sigma < 2:
                 T = T @ elementary_pose(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
-        return np.asarray(frames @ self.T_frame_link)
+        return check_range(np.asarray(frames @ self.T_frame_link))
 
 
 def make_tree_parameters(tree: KinematicTree) -> TreeParameters:

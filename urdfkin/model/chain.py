@@ -18,6 +18,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.mimic import Coupling, make_coupling
@@ -115,7 +116,7 @@ class FrameChain(Displayable):
             )
             for joint, origin, axis in geometry
         ]
-        x, y, z = (self.origins()[-1].round(12) + 0.0).tolist()
+        x, y, z = (round(number, 12) + 0.0 for number in self.origins()[-1].tolist())
         return TextDocument(
             f"{self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints",
             (
@@ -182,6 +183,7 @@ class FrameChain(Displayable):
         """
         return float(self.lengths[1:].sum())
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the poses of all joint frames and of the tip.
 
@@ -194,7 +196,8 @@ class FrameChain(Displayable):
             (..., n + 1, 4, 4) poses in the base frame.
 
         Raises:
-            InputError: `q` has the wrong length.
+            InputError: `q` has the wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -202,7 +205,7 @@ class FrameChain(Displayable):
         [0.0, 0.5, 0.9]
         """
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
-        return self.path.frames(values)[..., ::2, :, :]
+        return check_range(self.path.frames(values)[..., ::2, :, :])
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the pose T_base_tip (..., 4, 4) for `q` (..., coordinates).

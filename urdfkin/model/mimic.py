@@ -16,8 +16,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, QuestionsSection
-from urdfkin.kinematics.inputs import as_floats
+from urdfkin.errors import InputError, NotFiniteError, QuestionsSection
+from urdfkin.kinematics.inputs import as_floats, check_range
 from urdfkin.model.configuration import parse_numbers
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
@@ -77,7 +77,8 @@ class Coupling:
         """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
         # Each row of G has at most one nonzero number, so no matrix product is needed.
-        return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
+        with np.errstate(over="ignore"):  # RangeError replaces this warning.
+            return check_range(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
@@ -89,6 +90,11 @@ class Coupling:
                 f"{symbol} needs {len(self.names)} values on its last axis: {names}",
                 found=f"shape {values.shape}",
                 remedy="take the path's coordinates from the robot's q, for example with select()",
+            )
+        if not np.isfinite(values).all():
+            where = np.argwhere(~np.isfinite(values))[0]
+            raise NotFiniteError(
+                f"{symbol} must be finite", where=self.names[where[-1]], found=str(values[tuple(where)])
             )
         return values
 
