@@ -295,6 +295,20 @@ def test_tables_and_chains_report_invalid_numbers_and_results_beyond_the_largest
                 function([0.1, bad])
 
 
+@pytest.mark.filterwarnings("error")
+def test_dh_raises_range_error_if_the_bound_on_accelerations_is_infinite() -> None:
+    """Every difference is below an infinite bound, so such a comparison proves nothing."""
+    near = 'xyz="0.3 0.1 0.2" rpy="1 0.2 0.3"'
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", near, more=limit()),
+            joint("y", "prismatic", "b", "c", near, "0 0.6 0.8", limit() + mimic("x", 1e200)),
+        )
+    )
+    with pytest.raises(RangeError, match="bound on a table"):
+        robot.dh("c", "a")
+
+
 def test_the_text_of_a_chain_contains_a_very_distant_tip() -> None:
     robot = loaded(chain([""], origin='xyz="1e300 0.1 0"'))
     assert "the tip is at (1e+300, 0.1, 0)" in str(robot.chain("l1", "l0"))
