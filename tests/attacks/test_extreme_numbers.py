@@ -259,6 +259,21 @@ def test_a_singular_value_beyond_the_largest_double_raises_range_error() -> None
         singular_values(np.full((3, 3), 1e308), np.zeros((3, 3)), np.ones(3, dtype=bool))
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("length", [1e-200, 1e-3, 1e100, 1e160, 1e300])
+def test_the_cause_of_a_singularity_does_not_depend_on_the_unit_of_length(length: float) -> None:
+    origin = f'xyz="{length!r} 0 0"'
+    robot = loaded(
+        robot_of(
+            joint("x", "continuous", "a", "b"),
+            joint("y", "continuous", "b", "c", origin),
+            joint("end", "fixed", "c", "d", origin),
+        )
+    )
+    text = str(robot.singular_values([0.3, 0.0], "d", "linear").singularity())
+    assert text.endswith("The axes of joints x and y lie in one plane with the origin of d.")
+
+
 def test_a_gradient_of_the_manipulability_beyond_the_largest_double_raises_range_error() -> None:
     robot, q = loaded(sliders(1e200, 1e200, 1e200)), [0.0, 0.0, 0.0, 0.3]
     found = robot.singular_values(q, "arm3", "linear")
