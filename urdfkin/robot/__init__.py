@@ -1557,8 +1557,8 @@ class Robot(Displayable):
             UnknownNameError: a frame or a joint does not exist.
             InputError: an option has an invalid value; `like` excludes an option; `like` describes a
                 different robot; the path contains a planar or floating joint.
-            RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m; or
-                the bound on the table's errors leaves the range of double precision.
+            RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
+                Or the bound on the table's errors leaves the range of double precision.
             TableError: Pinocchio's placements differ by more than the bound.
 
         Example:
