@@ -1,6 +1,7 @@
 """Very small and very large inputs: correct results are returned and verified, others raise RangeError."""
 
 import math
+import re
 import shlex
 from collections.abc import Callable
 from typing import Any
@@ -272,6 +273,42 @@ def test_the_cause_of_a_singularity_does_not_depend_on_the_unit_of_length(length
     )
     text = str(robot.singular_values([0.3, 0.0], "d", "linear").singularity())
     assert text.endswith("The axes of joints x and y lie in one plane with the origin of d.")
+
+
+def test_exported_code_contains_no_decimal_that_a_compiler_rounds_to_zero() -> None:
+    """With -Werror, such a decimal stops the compilation of the C code, and with it `export --check`."""
+    turned = 'xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"'
+    robot = loaded(
+        robot_of(
+            joint("x", "continuous", "a", "b"),
+            joint("y", "continuous", "a", "c", turned, "0.6 0 0.8", mimic("x", 1e-170)),
+            joint("z", "continuous", "c", "d", turned, "0 0.6 0.8", mimic("x", 1e-170)),
+        )
+    )
+    code = robot.export("c", "d", ["hessian"])
+    decimals = re.findall(r"[1-9]\.[0-9]+e-[0-9]+", code)
+    assert decimals
+    assert all(map(float, decimals))
+
+
+@pytest.mark.filterwarnings("error")
+def test_overflow_causes_no_warning_of_numpy() -> None:
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", 'xyz="1.5e308 0 0"', more=limit()),
+            joint("y", "prismatic", "b", "c", more=limit() + mimic("x", 1e10)),
+            joint("z", "continuous", "a", "d", 'xyz="-1.5e308 0 0"'),
+        )
+    )
+    assert "inf is outside [-1, 1]" in robot.limit_violations([1.7e308, 0.0])[1]
+    base = BaseMotion(velocity=[1e200] * 6)
+    for compute in (
+        lambda: robot.relative_placement([0.0, 0.0], "c", "d"),
+        lambda: robot.relative_placement([0.0, 0.0], "c", "d", verify=False),
+        lambda: robot.imu([0.0, 0.0], [0.0, 0.0], [0.0, 0.0], "d", base=base),
+    ):
+        with pytest.raises(RangeError):
+            compute()
 
 
 def test_a_gradient_of_the_manipulability_beyond_the_largest_double_raises_range_error() -> None:

@@ -460,10 +460,11 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
         if not joint.kind.has_axis or joint.limit is None or not q.size:
             continue
         values = q[..., at]
-        if joint.mimic:
-            values = joint.mimic.multiplier * values + joint.mimic.offset
         lower, upper = _widen_by_rounding(joint.limit)
-        outside = np.maximum(lower - values, values - upper)
+        with np.errstate(over="ignore"):  # A value of inf is outside the limits.
+            if joint.mimic:
+                values = joint.mimic.multiplier * values + joint.mimic.offset
+            outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
             bounds = f"[{joint.limit.lower:.6g}, {joint.limit.upper:.6g}]"

@@ -26,7 +26,7 @@ from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_int, as_names, as_str, safe_repr
 from urdfkin.export import DEFAULT_QUANTITIES as EXPORTED
-from urdfkin.kinematics.inputs import as_finite, as_vectors
+from urdfkin.kinematics.inputs import as_finite, as_vectors, check_range
 from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
@@ -865,7 +865,8 @@ class Robot(Displayable):
         T_world = call.run_and_locate_error(
             PLACEMENT.compute_results, call.plan, (call.q,), None, threads=threads
         )
-        T = relative_pose(T_world[:, -1:], T_world[:, :-1], to)
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            T = check_range(relative_pose(T_world[:, -1:], T_world[:, :-1], to))
         result = call.restore_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
         return result

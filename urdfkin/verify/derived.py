@@ -28,7 +28,11 @@ from urdfkin.verify.call import CallPart
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import OracleLibrary
 
+#: The comparison reports inf and NaN, so NumPy need not warn.
+_ignore_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
+
+@_ignore_overflow
 def derive_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
@@ -45,10 +49,9 @@ def derive_analytical_jacobian(
         # q and -q are the same rotation, and results have qw >= 0.
         # Both signs are accepted if |qw| is below the rounding error.
         # Products of very small or very large numbers would leave the range of doubles.
-        with np.errstate(over="ignore"):
-            same, other = (
-                np.abs(x)[..., 3:, :].max(axis=(-2, -1), initial=0.0) for x in (ours - theirs, ours + theirs)
-            )
+        same, other = (
+            np.abs(x)[..., 3:, :].max(axis=(-2, -1), initial=0.0) for x in (ours - theirs, ours + theirs)
+        )
         opposite = other < same
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
@@ -58,6 +61,7 @@ def derive_analytical_jacobian(
     return theirs, bounds.euler_jacobian_bound(bound, magnitudes, axis_sine)
 
 
+@_ignore_overflow
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
@@ -89,6 +93,7 @@ def derive_relative_placement(
     return theirs, Bound(world.scale[:, :-1], world.k[:, :-1] + 2.0 * world.k[:, -1:])
 
 
+@_ignore_overflow
 def derive_imu_reading(
     oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
