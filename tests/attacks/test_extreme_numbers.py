@@ -275,6 +275,41 @@ def test_the_cause_of_a_singularity_does_not_depend_on_the_unit_of_length(length
     assert text.endswith("The axes of joints x and y lie in one plane with the origin of d.")
 
 
+@pytest.mark.parametrize("size", [1e-200, 1e160, 1e200, 1e300])
+def test_an_mjcf_file_with_lengths_of_any_size_is_verified(size: float) -> None:
+    """MuJoCo's body is `size` away from the world's origin, and the joint `size` away from the body."""
+    vector = " ".join(repr(size * x) for x in (0.6, -0.2, 0.7))
+    body = f'<body name="b" pos="{vector}" euler="10 20 30">'
+    body += f'<geom size="1"/><joint name="j" axis="1 2 3" pos="{vector}"/></body>'
+    robot = urdfkin.load(f'<mujoco model="m"><worldbody>{body}</worldbody></mujoco>'.encode())
+    assert np.isfinite(robot.placement(robot.sample(3), "b")).all()
+    assert robot.certificate().verified
+
+
+def test_an_mjcf_file_whose_bound_leaves_the_range_of_doubles_raises_range_error() -> None:
+    body = '<body name="b" pos="1e200 0 0"><geom size="1"/><joint name="j" axis="1 2 3" ref="1e150"/></body>'
+    with pytest.raises(RangeError, match="bound on a position"):
+        urdfkin.load(f'<mujoco model="m"><worldbody>{body}</worldbody></mujoco>'.encode())
+
+
+@pytest.mark.parametrize("multiplier", [5e-324, 8e-320, -3e-308])
+def test_same_compares_robots_with_a_subnormal_multiplier(multiplier: float) -> None:
+    text = robot_of(
+        joint("x", "revolute", "a", "b", 'xyz="0.1 0 0"', more=limit()),
+        joint(
+            "y",
+            "revolute",
+            "b",
+            "c",
+            'xyz="0.1 0.2 0" rpy="1 0.2 0.3"',
+            more=limit() + mimic("x", multiplier),
+        ),
+        joint("z", "prismatic", "c", "d", 'xyz="0.1 0 0"', "0.6 0 0.8", limit()),
+    )
+    assert urdfkin.same(text, text)
+    assert not urdfkin.same(text, text.replace('offset="0"', 'offset="0.1"'))
+
+
 def test_exported_code_contains_no_decimal_that_a_compiler_rounds_to_zero() -> None:
     """With -Werror, such a decimal stops the compilation of the C code, and with it `export --check`."""
     turned = 'xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"'

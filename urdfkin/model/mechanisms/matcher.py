@@ -943,6 +943,8 @@ class _RulePair:
         return self.slope_b * beta + self.constant_b - self.constant_a
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
+        if not math.isfinite(offset):  # For a subnormal slope, beta can be inf.
+            return False
         difference = offset - self.offset
         if self.turns:
             difference = math.remainder(difference, 2.0 * math.pi)
