@@ -147,7 +147,7 @@ class FrameMotion:
         if not moving.any():
             return np.zeros(len(part))
         values = np.linalg.svd(part[:, :, moving], compute_uv=False)
-        return multiply_values(values)
+        return multiply_values(np.asarray(values, dtype=np.float64))
 
 
 def frame_motion(
