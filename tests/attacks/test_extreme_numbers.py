@@ -292,6 +292,20 @@ def test_an_mjcf_file_whose_bound_leaves_the_range_of_doubles_raises_range_error
         urdfkin.load(f'<mujoco model="m"><worldbody>{body}</worldbody></mujoco>'.encode())
 
 
+@pytest.mark.parametrize(("multiplier", "offset"), [(1e7, 0.0), (1e11, 0.3), (0.5, 1e9), (-1e14, 1e11)])
+def test_pinocchio_coordinates_with_a_large_mimic_rule_convert_back(multiplier: float, offset: float) -> None:
+    rule = mimic("x", multiplier, offset)
+    robot = loaded(
+        robot_of(joint("x", "continuous", "a", "b"), joint("y", "continuous", "b", "c", more=rule))
+    )
+    q = np.linspace(-3.1, 3.1, 200)[:, np.newaxis]
+    np.testing.assert_allclose(robot.from_pinocchio(robot.to_pinocchio(q)), q, atol=1e-14)
+    wrong = robot.to_pinocchio(q)
+    wrong[:, 2:] = robot.to_pinocchio(q + 1.0 / multiplier)[:, 2:]  # The mimic joint is 1 rad off.
+    with pytest.raises(InputError, match="the mimic joint must be"):
+        robot.from_pinocchio(wrong)
+
+
 @pytest.mark.parametrize("multiplier", [5e-324, 8e-320, -3e-308])
 def test_same_compares_robots_with_a_subnormal_multiplier(multiplier: float) -> None:
     text = robot_of(
