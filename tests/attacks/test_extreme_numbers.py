@@ -353,9 +353,27 @@ def test_overflow_causes_no_warning_of_numpy() -> None:
     for verify in (True, False):
         with pytest.raises(RangeError):
             robot.relative_placement([0.0, 0.0], "c", "d", verify=verify)
+    with pytest.raises(RangeError):
+        robot.screws("d", "a")
     base, zero = BaseMotion(velocity=np.full(6, 1e200)), np.zeros(2)
     with pytest.raises(RangeError):
         robot.imu(zero, zero, zero, "d", base=base)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_sum_of_contributions_beyond_the_largest_double_raises_range_error() -> None:
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", more=limit()),
+            joint("y", "prismatic", "b", "c", more=limit()),
+        )
+    )
+    zero, a = np.zeros(2), np.array([1.5e308, 1.5e308])
+    breakdown = robot.acceleration_breakdown(zero, zero, zero + 1e308 / 2, "c")
+    assert breakdown.total[2] == 1e308
+    for verify in (True, False):
+        with pytest.raises(RangeError):
+            _ = robot.acceleration_breakdown(zero, zero, a, "c", verify=verify).total
 
 
 def test_a_gradient_of_the_manipulability_beyond_the_largest_double_raises_range_error() -> None:

@@ -42,6 +42,7 @@ from urdfkin.compiled.evaluate import compute_in_parts, placements, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.kinematics.inputs import check_range
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
@@ -95,20 +96,20 @@ class AccelerationBreakdown(Displayable):
     @cached_property
     def total(self) -> FloatArray:
         """The frame's acceleration (..., 6)."""
-        total: FloatArray = self.base + self.by_joint.sum(axis=-2)
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.base + self.by_joint.sum(axis=-2))
 
     @cached_property
     def by_joint(self) -> FloatArray:
         """The sum of each joint's contributions (..., joints, 6)."""
-        total: FloatArray = self.terms.sum(axis=-2)
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.terms.sum(axis=-2))
 
     @cached_property
     def by_kind(self) -> FloatArray:
         """The sum of all joints' contributions of each kind (..., 4, 6)."""
-        total: FloatArray = self.terms.sum(axis=-3)
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.terms.sum(axis=-3))
 
 
 class _RelativeMotion(NamedTuple):

@@ -132,6 +132,7 @@ def check_opw(verifier: Verifier, chain: FrameChain, opw: OpwParameters) -> str 
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
     """Compare a product of exponentials with Pinocchio.
 
