@@ -1,6 +1,7 @@
 """Very small and very large inputs: correct results are returned and verified, others raise RangeError."""
 
 import math
+import re
 import shlex
 from collections.abc import Callable
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import urdfkin
 from tests.cli.running import urdfkin as command
@@ -18,7 +20,7 @@ from urdfkin.compiled import breakdown
 from urdfkin.compiled.breakdown import AccelerationBreakdown
 from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import NO_OVERFLOW_BOUND
-from urdfkin.errors import NotFiniteError, RangeError
+from urdfkin.errors import InputError, NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMAL
 from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
@@ -28,6 +30,7 @@ from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.exact.numbers import precision, read_exact_joints
 from urdfkin.verify.quantities import VELOCITY
+from urdfkin.verify.singular_values import singular_values
 
 #: A robot with joints of each kind and two mimic joints.
 ODD = robot_of(
@@ -214,6 +217,249 @@ def test_a_hessian_with_a_subnormal_and_a_large_multiplier_is_verified(small: fl
     for reference in ("local", "world", "local_world_aligned"):
         assert np.isfinite(robot.hessian([1e-12, 0.4], "e", reference)).all()
     assert robot.certificate().verified
+
+
+def sliders(*multipliers: float) -> str:
+    """Write a robot with three mimic joints along x, y and z, which mimic joints of other branches."""
+    joints = [joint(f"x{i}", "prismatic", "base", f"side{i}", more=limit()) for i in range(3)]
+    joints.append(joint("turn", "continuous", "base", "arm0", axis="1 0 0"))
+    for i, (axis, multiplier) in enumerate(zip(("1 0 0", "0 1 0", "0 0 1"), multipliers, strict=True)):
+        more = limit() + mimic(f"x{i}", multiplier)
+        joints.append(joint(f"m{i}", "prismatic", f"arm{i}", f"arm{i + 1}", axis=axis, more=more))
+    return robot_of(*joints)
+
+
+def test_a_hessian_without_large_products_is_verified_for_large_multipliers() -> None:
+    """The product of two multipliers overflows, but the derivative of a sliding column by a slide is 0."""
+    robot = loaded(sliders(1e200, 1e200, 1e200))
+    for reference in REFERENCES:
+        assert np.isfinite(robot.hessian([0.0, 0.0, 0.0, 0.3], "arm3", reference)).all()
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-320, 1e-200, 1e-170, 1.0, 1e155, 1e200])
+def test_the_sign_of_a_quaternion_at_half_a_turn_may_differ_for_columns_of_any_size(size: float) -> None:
+    """At half a turn, qw is 0. Rounding decides the sign of q and of all its derivatives."""
+    generator = np.random.default_rng(0)
+    for _ in range(30):
+        half_turn = math.pi * (axis := generator.normal(size=3)) / np.linalg.norm(axis)
+        roll, pitch, yaw = Rotation.from_rotvec(half_turn).as_euler("xyz")
+        robot = loaded(
+            robot_of(
+                joint("x", "continuous", "a", "b"),
+                joint(
+                    "y", "continuous", "a", "c", f'rpy="{roll} {pitch} {yaw}"', "0.6 0 0.8", mimic("x", size)
+                ),
+            )
+        )
+        assert np.isfinite(robot.analytical_jacobian([0.0], "c", "quaternion")).all()
+
+
+def test_a_singular_value_beyond_the_largest_double_raises_range_error() -> None:
+    with pytest.raises(RangeError, match="a singular value"):
+        singular_values(np.full((3, 3), 1e308), np.zeros((3, 3)), np.ones(3, dtype=bool))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("length", [1e-200, 1e-3, 1e100, 1e160, 1e300])
+def test_the_cause_of_a_singularity_does_not_depend_on_the_unit_of_length(length: float) -> None:
+    origin = f'xyz="{length!r} 0 0"'
+    robot = loaded(
+        robot_of(
+            joint("x", "continuous", "a", "b"),
+            joint("y", "continuous", "b", "c", origin),
+            joint("end", "fixed", "c", "d", origin),
+        )
+    )
+    text = str(robot.singular_values([0.3, 0.0], "d", "linear").singularity())
+    assert text.endswith("The axes of joints x and y lie in one plane with the origin of d.")
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e160, 1e200, 1e300])
+def test_an_mjcf_file_with_lengths_of_any_size_is_verified(size: float) -> None:
+    """MuJoCo's body is `size` away from the world's origin, and the joint `size` away from the body."""
+    vector = " ".join(repr(size * x) for x in (0.6, -0.2, 0.7))
+    body = f'<body name="b" pos="{vector}" euler="10 20 30">'
+    body += f'<geom size="1"/><joint name="j" axis="1 2 3" pos="{vector}"/></body>'
+    robot = urdfkin.load(f'<mujoco model="m"><worldbody>{body}</worldbody></mujoco>'.encode())
+    assert np.isfinite(robot.placement(robot.sample(3), "b")).all()
+    assert robot.certificate().verified
+
+
+def test_an_mjcf_file_whose_bound_leaves_the_range_of_doubles_raises_range_error() -> None:
+    body = '<body name="b" pos="1e200 0 0"><geom size="1"/><joint name="j" axis="1 2 3" ref="1e150"/></body>'
+    with pytest.raises(RangeError, match="bound on a position"):
+        urdfkin.load(f'<mujoco model="m"><worldbody>{body}</worldbody></mujoco>'.encode())
+
+
+@pytest.mark.parametrize(("multiplier", "offset"), [(1e7, 0.0), (1e11, 0.3), (0.5, 1e9), (-1e14, 1e11)])
+def test_pinocchio_coordinates_with_a_large_mimic_rule_convert_back(multiplier: float, offset: float) -> None:
+    rule = mimic("x", multiplier, offset)
+    robot = loaded(
+        robot_of(joint("x", "continuous", "a", "b"), joint("y", "continuous", "b", "c", more=rule))
+    )
+    q = np.linspace(-3.1, 3.1, 200)[:, np.newaxis]
+    np.testing.assert_allclose(robot.from_pinocchio(robot.to_pinocchio(q)), q, atol=1e-14)
+    wrong = robot.to_pinocchio(q)
+    wrong[:, 2:] = robot.to_pinocchio(q + 1.0 / multiplier)[:, 2:]  # The mimic joint is 1 rad off.
+    with pytest.raises(InputError, match="the mimic joint must be"):
+        robot.from_pinocchio(wrong)
+
+
+@pytest.mark.parametrize("multiplier", [5e-324, 8e-320, -3e-308])
+def test_same_compares_robots_with_a_subnormal_multiplier(multiplier: float) -> None:
+    text = robot_of(
+        joint("x", "revolute", "a", "b", 'xyz="0.1 0 0"', more=limit()),
+        joint(
+            "y",
+            "revolute",
+            "b",
+            "c",
+            'xyz="0.1 0.2 0" rpy="1 0.2 0.3"',
+            more=limit() + mimic("x", multiplier),
+        ),
+        joint("z", "prismatic", "c", "d", 'xyz="0.1 0 0"', "0.6 0 0.8", limit()),
+    )
+    assert urdfkin.same(text, text)
+    assert not urdfkin.same(text, text.replace('offset="0"', 'offset="0.1"'))
+
+
+def test_exported_code_contains_no_decimal_that_a_compiler_rounds_to_zero() -> None:
+    """With -Werror, such a decimal stops the compilation of the C code, and with it `export --check`."""
+    turned = 'xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"'
+    robot = loaded(
+        robot_of(
+            joint("x", "continuous", "a", "b"),
+            joint("y", "continuous", "a", "c", turned, "0.6 0 0.8", mimic("x", 1e-170)),
+            joint("z", "continuous", "c", "d", turned, "0 0.6 0.8", mimic("x", 1e-170)),
+        )
+    )
+    code = robot.export("c", "d", ["hessian"])
+    decimals = re.findall(r"[1-9]\.[0-9]+e-[0-9]+", code)
+    assert decimals
+    assert all(map(float, decimals))
+
+
+@pytest.mark.filterwarnings("error")
+def test_overflow_causes_no_warning_of_numpy() -> None:
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", 'xyz="1.5e308 0 0"', more=limit()),
+            joint("y", "prismatic", "b", "c", more=limit() + mimic("x", 1e10)),
+            joint("z", "continuous", "a", "d", 'xyz="-1.5e308 0 0"'),
+        )
+    )
+    assert "inf is outside [-1, 1]" in robot.limit_violations([1.7e308, 0.0])[1]
+    for verify in (True, False):
+        with pytest.raises(RangeError):
+            robot.relative_placement([0.0, 0.0], "c", "d", verify=verify)
+    with pytest.raises(RangeError):
+        robot.screws("d", "a")
+    base, zero = BaseMotion(velocity=np.full(6, 1e200)), np.zeros(2)
+    with pytest.raises(RangeError):
+        robot.imu(zero, zero, zero, "d", base=base)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_sum_of_contributions_beyond_the_largest_double_raises_range_error() -> None:
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", more=limit()),
+            joint("y", "prismatic", "b", "c", more=limit()),
+        )
+    )
+    zero, a = np.zeros(2), np.array([1.5e308, 1.5e308])
+    breakdown = robot.acceleration_breakdown(zero, zero, zero + 1e308 / 2, "c")
+    assert breakdown.total[2] == 1e308
+    for verify in (True, False):
+        with pytest.raises(RangeError):
+            _ = robot.acceleration_breakdown(zero, zero, a, "c", verify=verify).total
+
+
+def test_a_gradient_of_the_manipulability_beyond_the_largest_double_raises_range_error() -> None:
+    robot, q = loaded(sliders(1e200, 1e200, 1e200)), [0.0, 0.0, 0.0, 0.3]
+    found = robot.singular_values(q, "arm3", "linear")
+    assert (found.values.lower > 0.0).all()
+    with pytest.raises(RangeError, match="the gradient"):
+        found.manipulability_gradient(robot.hessian(q, "arm3"))
+
+
+def test_the_manipulability_of_a_motion_is_a_number_if_partial_products_overflow() -> None:
+    robot = loaded(sliders(1e200, 1e200, 1e-300))
+    motion = urdfkin.frame_motion(robot, (np.zeros((1, 4)),) * 3, "arm3")
+    assert motion.manipulability(slice(0, 3)).tolist() == [0.0]
+
+
+@pytest.mark.filterwarnings("error")
+def test_tables_and_chains_report_invalid_numbers_and_results_beyond_the_largest_double() -> None:
+    near = 'xyz="0.3 0.1 0.2" rpy="1 0.2 0.3"'
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", near, more=limit()),
+            joint("y", "prismatic", "b", "c", near, "0 0.6 0.8", limit()),
+            joint("z", "continuous", "c", "d", near, more=mimic("y", 1e10)),
+        )
+    )
+    path = robot.chain("d", "a")
+    functions: list[Callable[[Any], Any]] = [path.frames, path.placement, path.coupling.values]
+    functions += [robot.dh("d", "a").placement, robot.dh("d", "a").frames, robot.screws("d", "a").placement]
+    functions.append(robot.tree_parameters().placements)
+    for function in functions:
+        assert np.isfinite(function(np.array([1e100, 0.1]))).all()
+        with pytest.raises(RangeError, match="a result"):
+            function(np.array([1.7e308, 1.7e308]))
+        for bad in (math.nan, math.inf):
+            with pytest.raises(InputError, match="q must be finite"):
+                function(np.array([0.1, bad]))
+
+
+@pytest.mark.filterwarnings("error")
+def test_dh_raises_range_error_if_the_bound_on_accelerations_is_infinite() -> None:
+    """Every difference is below an infinite bound, so such a comparison proves nothing."""
+    near = 'xyz="0.3 0.1 0.2" rpy="1 0.2 0.3"'
+    robot = loaded(
+        robot_of(
+            joint("x", "prismatic", "a", "b", near, more=limit()),
+            joint("y", "prismatic", "b", "c", near, "0 0.6 0.8", limit() + mimic("x", 1e200)),
+        )
+    )
+    with pytest.raises(RangeError, match="bound on a table"):
+        robot.dh("c", "a")
+
+
+def test_the_text_of_a_chain_contains_a_very_distant_tip() -> None:
+    robot = loaded(chain([""], origin='xyz="1e300 0.1 0"'))
+    assert "the tip is at (1e+300, 0.1, 0)" in str(robot.chain("l1", "l0"))
+
+
+def test_the_breakdown_of_a_batch_has_the_bits_of_single_calls() -> None:
+    robot = loaded(
+        robot_of(
+            joint("x", "planar", "a", "b", 'rpy="0.3 0.2 0.1"'),
+            joint("y", "floating", "b", "c", 'rpy="0.3 0.2 0.1"', ""),
+            joint("z", "prismatic", "c", "d", 'rpy="0.3 0.2 0.1"', "0.6 0 0.8", limit()),
+            joint("w", "continuous", "d", "e", 'xyz="0.1 0.2 0.3"', "0.6 0 0.8"),
+        )
+    )
+    q, (v, a) = robot.sample(20), np.random.default_rng(0).normal(size=(2, 20, robot.nv))
+    for reference in REFERENCES:
+        batch = robot.acceleration_breakdown(q, v, a, "e", reference)
+        for i, row in enumerate(zip(q, v, a, strict=True)):
+            alone = robot.acceleration_breakdown(*row, "e", reference)
+            assert alone.terms.tobytes() == batch.terms[i].tobytes()
+            assert alone.total.tobytes() == batch.total[i].tobytes()
+
+
+def test_a_bound_beyond_the_largest_double_is_no_disagreement_of_a_motion() -> None:
+    """For the same inputs, `acceleration` raises RangeError too."""
+    robot = loaded(chain([""] * 2))
+    q, v = np.zeros((2, 2)), np.array([[1.0, 1.0], [6e153, 6e153]])
+    assert urdfkin.frame_motion(robot, (q[:1], v[:1], q[:1]), "l2").agrees
+    v = np.array([[1.0, 1.0], [1.5e154, -1.5e154]])
+    with pytest.raises(RangeError):
+        robot.acceleration(q, v, q, "l2")
+    with pytest.raises(RangeError, match=r"sample \[1\]"):
+        urdfkin.frame_motion(robot, (q, v, q), "l2")
 
 
 # -- results beyond the largest number -------------------------------------------------------------

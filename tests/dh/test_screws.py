@@ -14,10 +14,11 @@ from scipy.linalg import expm
 
 from tests.cli.running import good
 from tests.random_chains import trees
+from tests.urdfs import built, joint, limit
 from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.parse_table import read_table_or_screws
 from urdfkin.dh.screws import ProductOfExponentials, make_screws, screws_from_rows
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -87,6 +88,44 @@ def test_a_wrong_screw_is_detected_by_pinocchio() -> None:
     wrong[2, 5] += 1e-12
     with pytest.raises(TableError, match="product of exponentials disagrees"):
         check_screws(robot.verifier, replace(screws, space=wrong))
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-100, 1e-9, 1.0, 1e100, 1e200, 1e300])
+def test_a_wrong_length_of_any_size_is_detected_by_pinocchio(size: float) -> None:
+    def origin(*xyz: float) -> str:
+        return f'xyz="{" ".join(repr(size * x) for x in xyz)}" rpy="1 0.2 0.3"'
+
+    robot = built(
+        joint("x", "continuous", "a", "b", origin(1.0, 0.0, 0.1)),
+        joint("y", "continuous", "b", "c", origin(0.3, 0.1, 0.2), "0 0.6 0.8"),
+    )
+    for base in ("a", "b"):
+        screws = robot.screws("c", base)
+        wrong = np.array(screws.M)
+        wrong[:3, 3] *= 1.0 + 1e-12
+        with pytest.raises(TableError, match="product of exponentials disagrees"):
+            check_screws(robot.verifier, replace(screws, M=wrong))
+
+
+def test_screws_of_axes_that_pinocchio_replaces_are_verified() -> None:
+    robot = built(
+        joint("x", "continuous", "a", "b", 'xyz="0.1 0 0.3" rpy="1 0.2 0.3"', "9e-13 0 1"),
+        joint("y", "continuous", "b", "c", 'xyz="0.3 0.1 0.2" rpy="1 0.2 0.3"', "0 9e-13 1"),
+        joint("z", "prismatic", "c", "d", 'xyz="0.3 0.1 0.2"', "1 9e-13 0", limit()),
+    )
+    for base in ("a", "b"):
+        screws = robot.screws("d", base)
+        wrong = np.array(screws.M)
+        wrong[0, 3] += 1e-10
+        with pytest.raises(TableError, match="product of exponentials disagrees"):
+            check_screws(robot.verifier, replace(screws, M=wrong))
+
+
+def test_screws_raise_range_error_if_the_bound_leaves_the_range_of_doubles() -> None:
+    far = 'xyz="1.5e308 0 0"'
+    robot = built(joint("x", "continuous", "a", "b", far), joint("y", "continuous", "b", "c"))
+    with pytest.raises(RangeError, match="bound on a position"):
+        robot.screws("c", "a")
 
 
 def test_a_nan_in_pinocchios_rotation_is_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:

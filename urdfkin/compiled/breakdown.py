@@ -42,7 +42,7 @@ from urdfkin.compiled.evaluate import compute_in_parts, placements, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.kinematics.inputs import as_sample_index
+from urdfkin.kinematics.inputs import as_sample_index, check_range
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
@@ -104,20 +104,20 @@ class AccelerationBreakdown(Displayable):
     @cached_property
     def total(self) -> FloatArray:
         """The frame's acceleration (..., 6)."""
-        total: FloatArray = self.base + self.by_joint.sum(axis=-2)
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.base + self.by_joint.sum(axis=-2))
 
     @cached_property
     def by_joint(self) -> FloatArray:
         """The sum of each joint's contributions (..., joints, 6)."""
-        total: FloatArray = self.terms.sum(axis=-2)
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.terms.sum(axis=-2))
 
     @cached_property
     def by_kind(self) -> FloatArray:
         """The sum of all joints' contributions of each kind (..., 4, 6)."""
-        total: FloatArray = self.terms.sum(axis=-3)
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            return check_range(self.terms.sum(axis=-3))
 
 
 class _RelativeMotion(NamedTuple):
@@ -219,11 +219,10 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
-        own = (
-            joint.T_parent_joint[:3, 3]
-            + _joint_translation(joint, q[:, at:]) @ joint.T_parent_joint[:3, :3].T
-        )
-        levers[:, k] = (Rs[:, k] @ own[..., np.newaxis])[..., 0] + levers[:, k + 1]
+        R, d = joint.T_parent_joint[:3, :3], joint.T_parent_joint[:3, 3]
+        # A product of two matrices would have other bits for a batch than for one configuration.
+        own = d + eq.rotate(R, _joint_translation(joint, q[:, at:]))
+        levers[:, k] = eq.rotate(Rs[:, k], own) + levers[:, k + 1]
     return levers
 
 

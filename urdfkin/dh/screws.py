@@ -26,6 +26,7 @@ from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDoc
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.kinematics.inputs import as_floats, check_range, rotation_defect
+from urdfkin.kinematics.number_kinds import norm
 from urdfkin.kinematics.rotation import UNCHANGED_MATRIX_TOLERANCE, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
@@ -129,6 +130,7 @@ class ProductOfExponentials(Displayable):
             found.append(here)
         return np.array(found).reshape(-1, 3)
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose of the tip in the base frame.
 
@@ -137,6 +139,7 @@ class ProductOfExponentials(Displayable):
 
         Raises:
             InputError: `q` has the wrong length, or a number is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").placement([0.0, 0.0])[:3, 3].tolist()
@@ -189,7 +192,7 @@ class ProductOfExponentials(Displayable):
         values = np.abs(self.coupling.values(q))
         turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)
         points = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
-        length = 2.0 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        length = 2.0 * float(norm(np.diff(points, axis=0)).sum())
         lever = length + values[..., ~turns].sum(axis=-1)
         return np.asarray(EPS * (self.roundings + values[..., turns].sum(axis=-1)) * lever)
 

@@ -584,6 +584,7 @@ class DHTable(Displayable):
 
     # -- placement -----------------------------------------------------------------------------------
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
@@ -593,6 +594,7 @@ class DHTable(Displayable):
 
         Raises:
             InputError: `q` has the wrong length, or a number is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -614,6 +616,7 @@ class DHTable(Displayable):
             steps += [motion, constant @ row.X] if standard else [row.X @ constant, motion]
         return Path(tuple(steps))
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose T_base_tip, the product of base, rows and tool.
 
@@ -623,6 +626,7 @@ class DHTable(Displayable):
 
         Raises:
             InputError: `q` has the wrong length, or a number is not finite.
+            RangeError: a result leaves the range of double precision.
 
         Example:
             >>> import math

@@ -155,6 +155,10 @@ class TreeParameters:
 
         Returns:
             (..., joints, 4, 4) poses of the URDF link frames in the root frame.
+
+        Raises:
+            InputError: `q` has the wrong length, or a number that is not finite.
+            RangeError: a result leaves the range of double precision.
         """
         q = self._parse(q)
         with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
@@ -170,7 +174,7 @@ class TreeParameters:
             if row.sigma < 2:
                 T = T @ elementary_pose(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
-        return np.asarray(frames @ self.T_frame_link)
+        return check_range(np.asarray(frames @ self.T_frame_link))
 
 
 def make_tree_parameters(tree: KinematicTree) -> TreeParameters:

@@ -235,10 +235,11 @@ def _tolerances_and_scales(
 def format_decimal(x: Number) -> str:
     """Return an interval's midpoint as decimal text with at most `REFERENCE_DIGITS` digits.
 
-    Return "0.0" for an interval that contains 0.
+    Return "0.0" for an interval that contains 0, or if the midpoint rounds to the double 0.
     """
     ball = as_interval(x)
-    if ball.contains(0):
+    # C compilers warn about a decimal that rounds to 0.
+    if ball.contains(0) or float(ball) == 0.0:
         return "0.0"
     digits, e, exponent = ball.str(REFERENCE_DIGITS, radius=False).partition("e")
     whole, _, fraction = digits.partition(".")

@@ -115,7 +115,7 @@ class FrameChain(Displayable):
             )
             for joint, origin, axis in geometry
         ]
-        x, y, z = (self.origins()[-1].round(12) + 0.0).tolist()
+        x, y, z = (round(number, 12) + 0.0 for number in self.origins()[-1].tolist())
         return TextDocument(
             f"{self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints",
             (
@@ -182,6 +182,7 @@ class FrameChain(Displayable):
         """
         return float(self.lengths[1:].sum())
 
+    @np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
     def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the poses of all joint frames and of the tip.
 
@@ -195,6 +196,7 @@ class FrameChain(Displayable):
 
         Raises:
             InputError: `q` has the wrong length, or a number is not finite.
+            RangeError: a result leaves the range of double precision.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

@@ -466,10 +466,11 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
         if not joint.kind.has_axis or joint.limit is None or not q.size:
             continue
         values = q[..., at]
-        if joint.mimic:
-            values = joint.mimic.multiplier * values + joint.mimic.offset
         lower, upper = _widen_by_rounding(joint.limit)
-        outside = np.maximum(lower - values, values - upper)
+        with np.errstate(over="ignore"):  # A value of inf is outside the limits.
+            if joint.mimic:
+                values = joint.mimic.multiplier * values + joint.mimic.offset
+            outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
             bounds = f"[{joint.limit.lower:.6g}, {joint.limit.upper:.6g}]"
@@ -658,13 +659,27 @@ def check_turns(
 
 
 def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArray) -> None:
+    """Compare the values of a mimic joint with its rule m x + c.
+
+    The rounding errors of large terms are added to `_MIMIC_TOLERANCE`:
+
+    | Rounding error | At most, in eps |
+    |---|---|
+    | cosine and sine of x, each 0.5; x = arctan2(sine, cosine), at most pi | 0.7 abs(m) + 1.6 abs(m) |
+    | m x + c, in `to_pinocchio` and here: product and sum, each 0.5 | 2 abs(m x) + abs(c) |
+    | cosine and sine of the mimic joint; arctan2 | less than `_MIMIC_TOLERANCE` |
+    | sum, at most | 4.3 (abs(m) max(1, abs(x)) + abs(c)) |
+    | allowed | 5 (abs(m) max(1, abs(x)) + abs(c)) |
+    """
     rule = joint.mimic
     if rule is None or not values.size:
         return
     deviation = rule.multiplier * mimicked_joint + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
         deviation = _without_turns(deviation)
-    if np.abs(deviation).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
+    x = max(1.0, float(np.abs(mimicked_joint).max()))
+    rounding = 5.0 * EPS * (abs(rule.multiplier) * x + abs(rule.offset))
+    if np.abs(deviation).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())) + rounding:
         raise InputError(
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
             where=f"joint {joint.name}",

@@ -35,7 +35,7 @@ from urdfkin.errors.validators import (
     safe_repr,
 )
 from urdfkin.export import DEFAULT_QUANTITIES as EXPORTED
-from urdfkin.kinematics.inputs import as_finite, as_vectors
+from urdfkin.kinematics.inputs import as_finite, as_vectors, check_range
 from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
@@ -877,7 +877,8 @@ class Robot(Displayable):
         T_world = call.run_and_locate_error(
             PLACEMENT.compute_results, call.plan, (call.q,), None, threads=threads
         )
-        T = relative_pose(T_world[:, -1:], T_world[:, :-1], to)
+        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+            T = check_range(relative_pose(T_world[:, -1:], T_world[:, :-1], to))
         result = call.restore_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
         return result
@@ -1570,6 +1571,7 @@ class Robot(Displayable):
             InputError: an option has an invalid value; `like` excludes an option; `like` describes a
                 different robot; the path contains a planar or floating joint.
             RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
+                Or the bound on the table's errors leaves the range of double precision.
             TableError: Pinocchio's placements differ by more than the bound.
 
         Example:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.errors.validators import as_instance, as_str, safe_repr
 from urdfkin.kinematics.inputs import as_rows
 from urdfkin.model.configuration_like import ConfigurationLike
@@ -33,6 +33,7 @@ from urdfkin.verify.quantities import (
     Quantity,
     validated_quantities,
 )
+from urdfkin.verify.singular_values import multiply_values
 from urdfkin.verify.verifier import compute_oracle_results_with_bound
 
 
@@ -152,7 +153,7 @@ class FrameMotion:
         if not moving.any():
             return np.zeros(len(part))
         values = np.linalg.svd(part[:, :, moving], compute_uv=False)
-        return np.asarray(values.prod(axis=-1), dtype=np.float64)
+        return multiply_values(np.asarray(values, dtype=np.float64))
 
 
 def frame_motion(
@@ -175,6 +176,7 @@ def frame_motion(
     Raises:
         InputError: an array is missing, has a wrong length, or contains a number that is not finite.
         UnknownNameError: the frame or reference does not exist.
+        RangeError: a result or a bound leaves the range of doubles.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -224,6 +226,13 @@ def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> MotionC
     theirs, bound = compute_oracle_results_with_bound(
         row, robot.verifier.oracle(call.base), call.select(slice(0, call.n)), ours
     )
+    is_finite = np.isfinite(theirs) & np.isfinite(np.broadcast_to(bound.scale, ours.shape))
+    if not is_finite.all():
+        raise RangeError(
+            f"the {row.name} of {call.frames[0]} leaves the range of double precision",
+            where=f"sample [{int(np.argwhere(~is_finite)[0, 0])}]",
+            remedy="give smaller numbers",
+        )
     units = worst_disagreements(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(broadcast_k(bound, units.shape), units.shape)
     return MotionCheck(units[:, 0], bound_ratios(units, k)[:, 0], k[:, 0])

@@ -31,6 +31,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from urdfkin.errors import InputError
+from urdfkin.kinematics.number_kinds import norm
 from urdfkin.kinematics.rotation import rotation_about, rotation_from_quaternion
 from urdfkin.model.tree import (
     MAX_PLAUSIBLE_ANGLE,
@@ -151,15 +152,15 @@ class Mjcf:
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
         for i in range(1, m.nbody):
-            added_length = np.full(len(q), float(np.linalg.norm(m.body_pos[i])))
+            added_length = np.full(len(q), float(norm(m.body_pos[i])))
             for j, kind, address in self._body_joints(i):
                 if kind == "free":
-                    added_length = np.linalg.norm(qpos[:, address : address + 3], axis=1)
+                    added_length = norm(qpos[:, address : address + 3])
                 elif kind == "slide":
                     added_length = added_length + qpos[:, address] + abs(m.qpos0[address])
-                added_length = added_length + 2.0 * np.linalg.norm(m.jnt_pos[j])
+                added_length = added_length + 2.0 * norm(m.jnt_pos[j])
             at_body[:, i] = at_body[:, m.body_parentid[i]] + added_length
-        return self._make_frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
+        return self._make_frame_values(at_body, norm(m.site_pos))
 
     def hinge_angle_sums(self, q: FloatArray) -> FloatArray:
         """Return, for each frame, the sum (n, frames) of |q| + |ref| (rad).

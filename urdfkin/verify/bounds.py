@@ -593,7 +593,9 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
         i, j = columns[:, np.newaxis], columns[np.newaxis, :]
         before = step[j] <= step[i]
         sizes = product(multipliers[i], multipliers[j])
-        both, one = sizes * (is_rotation[i] & is_rotation[j]), sizes * (is_rotation[i] ^ is_rotation[j])
+        # The product of two multipliers may be inf, and inf * 0 is NaN.
+        both = np.where(is_rotation[i] & is_rotation[j], sizes, 0.0)
+        one = np.where(is_rotation[i] ^ is_rotation[j], sizes, 0.0)
         entry = frame, v_index[i], v_index[j]
         np.add.at(turning, entry, both * np.where(before, near, far))
         np.add.at(mixed, entry, one * np.where(before, near_mixed, far_mixed))

@@ -30,7 +30,8 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.structure import OpwParameters
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import OracleError
+from urdfkin.errors import OracleError, RangeError
+from urdfkin.kinematics.number_kinds import norm
 from urdfkin.kinematics.roundings import (
     EPS,
     ROW_ROUNDINGS,
@@ -99,7 +100,7 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
     direction = np.maximum(differences[..., 2].max(initial=0.0), differences[:, -1, :, :3].max(initial=0.0))
     ends = [i for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
     rounding = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].pinocchio_tilt for i in ends)))
-    length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + chain.lengths.sum()
+    length = norm(base[..., :3, 3]).max(initial=0.0) + chain.lengths.sum()
     displacements = values[:, [not joint.kind.turns for joint in chain.joints]]
     length += np.abs(displacements).sum(axis=-1).max(initial=0.0)
     bound_ratio = np.maximum(metres / (rounding * length + SMALLEST_SUBNORMAL), direction / rounding)
@@ -130,20 +131,39 @@ def check_opw(verifier: Verifier, chain: FrameChain, opw: OpwParameters) -> str 
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
+    """Compare a product of exponentials with Pinocchio.
+
+    | | Relative error | Length |
+    |---|---|---|
+    | product of exponentials | `ProductOfExponentials.rounding` | included |
+    | Pinocchio | of the joints from the root to both ends | from the root to the base, and the chain |
+
+    The chain's length includes the displacements of prismatic joints. Both programs reduce an angle exactly,
+    so a large angle adds no error.
+    """
     if verifier.find_refusal() is not None:
         return None
     q, base, tip = _sample_base_and_tip(verifier, screws.base_frame, screws.tip_frame)
     coordinates = screws.coupling.select(verifier.tree, q)
-    coordinate_sum = np.abs(coordinates).sum(axis=-1)
+    displacements = screws.coupling.values(coordinates)[:, [not joint.kind.turns for joint in screws.joints]]
     differences = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     chain = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
     # Pinocchio's placements are relative to the root.
     # The product of exponentials is relative to the base.
-    lever = np.linalg.norm(base[:, :3, 3], axis=-1) + chain.reach + float(chain.lengths[0])
-    joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (chain.base, chain.tip))
-    rounding = EPS * (joint_roundings(joints) + coordinate_sum) + sum_zeroed_tilts(chain)
-    allowed = screws.rounding(coordinates) + rounding * (lever + coordinate_sum)
+    lever = norm(base[:, :3, 3]) + chain.lengths.sum() + np.abs(displacements).sum(axis=-1)
+    tree = verifier.tree
+    ends = [tree.joints[i] for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
+    tilt = sum(joint.pinocchio_tilt for joint in ends)
+    rounding = EPS * float(joint_roundings(len(ends), tilt)) + sum_zeroed_tilts(chain)
+    allowed = screws.rounding(coordinates) + rounding * lever
+    if not np.isfinite(allowed).all():
+        raise RangeError(
+            "the bound on a position exceeds the range of double precision",
+            where=f"{screws.robot}, {screws.base_frame} to {screws.tip_frame}",
+            remedy="give smaller numbers",
+        )
     position_ratio = (differences[..., 3].max(axis=-1) / (allowed + SMALLEST_SUBNORMAL)).max(initial=0.0)
     rotation_ratio = (differences[..., :3].max(axis=(-1, -2)) / (rounding + EPS * screws.roundings)).max()
     bound_ratio = np.maximum(position_ratio, rotation_ratio)  # NaN is a disagreement.

@@ -28,7 +28,11 @@ from urdfkin.verify.call import CallPart
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import OracleLibrary
 
+#: The comparison reports inf and NaN, so NumPy need not warn.
+_ignore_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
+
+@_ignore_overflow
 def derive_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
@@ -45,7 +49,11 @@ def derive_analytical_jacobian(
         # Results have qw >= 0.
         # Near qw = 0, rounding errors decide the sign of q.
         # Near qw = 0, the check therefore accepts q and -q.
-        opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
+        # Products of numbers could leave the range of doubles.
+        same, other = (
+            np.abs(x)[..., 3:, :].max(axis=(-2, -1), initial=0.0) for x in (ours - theirs, ours + theirs)
+        )
+        opposite = other < same
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
@@ -54,6 +62,7 @@ def derive_analytical_jacobian(
     return theirs, bounds.euler_jacobian_bound(bound, magnitudes, axis_sine)
 
 
+@_ignore_overflow
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
@@ -85,6 +94,7 @@ def derive_relative_placement(
     return theirs, Bound(world.scale[:, :-1], world.k[:, :-1] + 2.0 * world.k[:, -1:])
 
 
+@_ignore_overflow
 def derive_imu_reading(
     oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
-from urdfkin.errors import InputError, OracleError
+from urdfkin.errors import InputError, OracleError, RangeError
 from urdfkin.errors.escape import escape_unprintable
 from urdfkin.kinematics.roundings import EPS, MJCF_MIMIC_ROUNDINGS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
@@ -138,6 +138,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
     Raises:
         OracleError: A body, a site or a mimic rule differs by more than rounding errors.
+        RangeError: The bound on a position exceeds the range of doubles.
     """
     tree, answer = verifier.tree, reading.answer
     q = unpack_array(answer["q"])
@@ -149,6 +150,12 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpack_array(answer["lengths"]), unpack_array(answer["angles"]))
+    if not np.isfinite(bound.scale).all():
+        raise RangeError(
+            "the bound on a position exceeds the range of double precision",
+            where=tree.name,
+            remedy="give smaller numbers",
+        )
     ratio = _compute_bound_ratios(ours, _unpack_placements(answer["placements"]), bound)
     if not (ratio <= 1.0).all():
         k, f = np.unravel_index(int(np.nan_to_num(ratio, nan=np.inf).argmax()), ratio.shape)

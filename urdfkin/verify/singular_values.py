@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.kinematics.inputs import as_finite, as_sample_index
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
@@ -150,7 +150,7 @@ class SingularValues(Displayable):
         if not self.values.value.shape[-1]:
             zero = np.zeros(self.values.value.shape[:-1])
             return BoundedArray(zero, zero, zero)
-        value, lower, upper = map(_product, self.values)
+        value, lower, upper = map(multiply_values, self.values)
         return BoundedArray(value, np.maximum(_bound_below(lower), 0.0), _bound_above(upper))
 
     @cached_property
@@ -192,6 +192,7 @@ class SingularValues(Displayable):
 
         Raises:
             InputError: H has another shape or contains a number that is not finite.
+            RangeError: the gradient leaves the range of double precision.
 
         >>> import urdfkin
         >>> arm, q = urdfkin.load("planar_two_link"), [0.3, 1.0]
@@ -209,13 +210,19 @@ class SingularValues(Displayable):
             )
         other_products = np.ones_like(value)
         for k in range(count):
-            other_products[..., k] = _product(np.delete(value, k, axis=-1))
-        weights = (self.U * other_products[..., np.newaxis, :]) @ np.swapaxes(self.V, -1, -2)
-        batch, rows = weights.shape[:-2], weights.shape[-2]
-        derivatives = derivatives[..., self.rows, :, :].reshape(*batch, rows * nv, nv)
-        gradient: FloatArray = (weights.reshape(*batch, 1, rows * nv) @ derivatives)[..., 0, :]
+            other_products[..., k] = multiply_values(np.delete(value, k, axis=-1))
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            weights = (self.U * other_products[..., np.newaxis, :]) @ np.swapaxes(self.V, -1, -2)
+            batch, rows = weights.shape[:-2], weights.shape[-2]
+            derivatives = derivatives[..., self.rows, :, :].reshape(*batch, rows * nv, nv)
+            gradient: FloatArray = (weights.reshape(*batch, 1, rows * nv) @ derivatives)[..., 0, :]
         if count:
-            gradient[self.values.lower[..., -1] <= 0.0] = np.nan
+            exists = self.values.lower[..., -1] > 0.0
+            if not np.isfinite(gradient[exists]).all():
+                raise RangeError(
+                    "the gradient leaves the range of double precision", remedy="give smaller numbers"
+                )
+            gradient[~exists] = np.nan
         return gradient
 
 
@@ -236,6 +243,10 @@ def singular_values(
     """
     A, A_error = (x[..., rows, :][..., is_active] for x in (J, error))
     U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    if not np.isfinite(s).all():
+        raise RangeError(
+            "a singular value leaves the range of double precision", remedy="give smaller numbers"
+        )
     V = np.zeros((*J.shape[:-2], J.shape[-1], s.shape[-1]))
     V[..., is_active, :] = Vt.swapaxes(-1, -2)
     terms = s.shape[-1] + 4
@@ -274,8 +285,8 @@ def _bound_norm(E: FloatArray) -> FloatArray:
     return _bound_above(norm)
 
 
-def _product(x: FloatArray) -> FloatArray:
-    """Multiply without intermediate overflow or underflow."""
+def multiply_values(x: FloatArray) -> FloatArray:
+    """Multiply the numbers of the last axis without intermediate overflow or underflow."""
     mantissas, exponents = np.frexp(x)
     with np.errstate(over="ignore", under="ignore"):
         product: FloatArray = np.ldexp(mantissas.prod(axis=-1), exponents.sum(axis=-1))

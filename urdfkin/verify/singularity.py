@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.errors.display import Displayable, TextDocument, format_number
+from urdfkin.kinematics.number_kinds import norm
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
@@ -191,7 +192,7 @@ class _SingularityExplainer:
         # `_bound_matrix_error` includes the base's distance from the world origin.
         # The samples have no base, so `_RANK_TOLERANCE` limits the noise.
         noise = min(self._bound_matrix_error(), _RANK_TOLERANCE)
-        tolerances = np.maximum(noise, _RANK_TOLERANCE * np.linalg.norm(samples, axis=(1, 2)))
+        tolerances = np.maximum(noise, _RANK_TOLERANCE * norm(samples.reshape(len(samples), -1)))
         generic_rank = int(np.linalg.matrix_rank(samples, tol=tolerances).max())
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return generic_rank, U[:, int((s > max(noise, _RANK_TOLERANCE * s[0])).sum()) :]
@@ -236,7 +237,7 @@ class _SingularityExplainer:
                     continue
                 A, A_error = self._A[:, columns], self._A_error[:, columns]
                 smallest_value = np.linalg.svd(A, compute_uv=False)[-1]
-                if smallest_value <= np.linalg.norm(A_error) + self._bound_rounding_error(A):
+                if smallest_value <= norm(A_error.ravel()) + self._bound_rounding_error(A):
                     found.append(set(columns))
                     yield columns
 
@@ -293,7 +294,7 @@ class _SingularityExplainer:
         indices = self._moving[list(columns)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
-        tolerance = 2.0 * float(np.linalg.norm(self._error[:, indices])) * size
+        tolerance = 2.0 * float(norm(self._error[:, indices].ravel())) * size
         tolerance += self._bound_rounding_error(self._J[:, indices]) * size
         are_parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= tolerance).all())
         axes = f"The axes of {self._name_joints(columns)}"
@@ -341,11 +342,11 @@ class _SingularityExplainer:
         return f"{'joint' if len(columns) == 1 else 'joints'} {names}"
 
     def _bound_matrix_error(self) -> float:
-        return float(np.linalg.norm(self._A_error)) + self._bound_rounding_error(self._A)
+        return float(norm(self._A_error.ravel())) + self._bound_rounding_error(self._A)
 
     @staticmethod
     def _bound_rounding_error(A: FloatArray) -> float:
-        return float(_ROUNDINGS * sum(A.shape) * EPS * np.linalg.norm(A))
+        return float(_ROUNDINGS * sum(A.shape) * EPS * norm(A.ravel()))
 
 
 def _make_sparse_basis(rows: FloatArray) -> FloatArray:

@@ -41,7 +41,7 @@ from urdfkin.dh.common_normals import sum_zeroed_tilts
 from urdfkin.dh.motion import acceleration, jacobian
 from urdfkin.dh.snapping import MAX_SNAP_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
-from urdfkin.errors import UrdfkinError
+from urdfkin.errors import RangeError, UrdfkinError
 from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings, table_roundings
 from urdfkin.model.chain import make_chain
 from urdfkin.model.configuration import Samples
@@ -114,6 +114,7 @@ class TableCheck:
         )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> TableCheck:
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
@@ -187,6 +188,11 @@ def _compare_with_bounds(
             (rates, 4.0 * snap_effect.turn * rates),
         ),
     }
+    if not all(np.isfinite(x).all() for halves in limits.values() for pair in halves for x in pair):
+        raise RangeError(
+            "the bound on a table's rounding errors exceeds the range of double precision",
+            remedy="give smaller numbers",
+        )
     units, bound_ratios = dict[str, float](), dict[str, float]()
     for name, halves in differences.items():
         pairs = list(zip(halves, limits[name], strict=True))

@@ -1013,6 +1013,8 @@ class _RulePair:
         return self.slope_b * beta + self.constant_b - self.constant_a
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
+        if not math.isfinite(offset):  # For a subnormal slope, beta can be inf.
+            return False
         difference = offset - self.offset
         if not math.isfinite(difference):  # a tiny multiplier makes `beta` overflow
             return False
