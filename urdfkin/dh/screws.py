@@ -145,9 +145,7 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        values = self.coupling.values(q)
-        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
-            return check_range(self.path.poses(values))
+        return check_range(self.path.poses(self.coupling.values(q)))
 
     @cached_property
     def path(self) -> Path:

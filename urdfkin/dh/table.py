@@ -635,8 +635,7 @@ class DHTable(Displayable):
             >>> arm.placement([math.pi / 2])[:3, 3].round(12).tolist()
             [0.0, 2.0, 0.0]
         """
-        with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
-            return check_range(np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool))
+        return check_range(np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool))
 
 
 def as_table(table: object, name: str = "table") -> DHTable:

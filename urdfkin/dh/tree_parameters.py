@@ -174,7 +174,7 @@ class TreeParameters:
             if row.sigma < 2:
                 T = T @ elementary_pose(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
-        return check_range(np.asarray(frames @ self.T_frame_link))
+        return np.asarray(frames @ self.T_frame_link)
 
 
 def make_tree_parameters(tree: KinematicTree) -> TreeParameters:

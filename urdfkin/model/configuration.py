@@ -625,7 +625,9 @@ def count_turns(angle: FloatArray, shown: Sequence[tuple[float, float, FloatArra
     fits = np.ones(turns.shape, bool)
     for multiplier, offset, value, _ in shown:
         rest = (value - offset - multiplier * angle)[..., None] - multiplier * math.tau * turns
-        fits &= np.abs(_without_turns(rest)) <= _MIMIC_TOLERANCE
+        # With the rounding error, a very large multiplier would fit for any number of turns.
+        rounding = np.where(turns == 0.0, _mimic_rounding(multiplier, offset, angle)[..., None], 0.0)
+        fits &= np.abs(_without_turns(rest)) <= _MIMIC_TOLERANCE + rounding
     return np.take_along_axis(turns, fits.argmax(axis=-1)[..., None], axis=-1)[..., 0]
 
 
@@ -658,10 +660,8 @@ def check_turns(
             )
 
 
-def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArray) -> None:
-    """Compare the values of a mimic joint with its rule m x + c.
-
-    The rounding errors of large terms are added to `_MIMIC_TOLERANCE`:
+def _mimic_rounding(multiplier: float, offset: float, x: FloatArray) -> FloatArray:
+    """Return the rounding error that is added to `_MIMIC_TOLERANCE`, for a mimic rule m x + c.
 
     | Rounding error | At most, in eps |
     |---|---|
@@ -671,14 +671,18 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
     | sum, at most | 4.3 (abs(m) max(1, abs(x)) + abs(c)) |
     | allowed | 5 (abs(m) max(1, abs(x)) + abs(c)) |
     """
+    return np.asarray(5.0 * EPS * (abs(multiplier) * np.maximum(1.0, np.abs(x)) + abs(offset)))
+
+
+def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArray) -> None:
+    """Compare the values of a mimic joint with its rule m x + c."""
     rule = joint.mimic
     if rule is None or not values.size:
         return
     deviation = rule.multiplier * mimicked_joint + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
         deviation = _without_turns(deviation)
-    x = max(1.0, float(np.abs(mimicked_joint).max()))
-    rounding = 5.0 * EPS * (abs(rule.multiplier) * x + abs(rule.offset))
+    rounding = float(_mimic_rounding(rule.multiplier, rule.offset, mimicked_joint).max())
     if np.abs(deviation).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())) + rounding:
         raise InputError(
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
