@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.errors.validators import as_str
 from urdfkin.kinematics.rotation import coordinate_rotation, rotation_from_quaternion, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
@@ -21,6 +20,7 @@ from urdfkin.model.tree import (
     with_root_joint,
 )
 from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRecord
+from urdfkin.urdf.sources import check_root_joint
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
@@ -129,8 +129,3 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
             offset = rule.multiplier * end.offset + rule.offset
             end = resolved[name] = Mimic(end.mimicked_joint, rule.multiplier * end.multiplier, offset)
     return resolved
-
-
-def check_root_joint(root_joint: object) -> None:
-    if root_joint is not None and as_str(root_joint, "root_joint") not in ("floating", "planar"):
-        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))

@@ -22,6 +22,11 @@ from urdfkin.urdf.catalogue import CatalogueEntry, catalogue, find_package, spli
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
+def check_root_joint(root_joint: object) -> None:
+    if root_joint is not None and as_str(root_joint, "root_joint") not in ("floating", "planar"):
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))
+
+
 @dataclass(frozen=True, slots=True)
 class Origin:
     """The arguments of `load`, and properties of the source.

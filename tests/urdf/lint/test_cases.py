@@ -1,5 +1,6 @@
 """Odd documents have the expected findings: URDFs, MJCF and USD files, limits, any bytes, large files."""
 
+import math
 import re
 import time
 import warnings
@@ -7,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given
@@ -223,7 +225,7 @@ def test_a_chain_of_50000_links_has_no_finding_and_a_loop_has_one_error_on_its_l
     (finding,) = timed(chain("\n" + back))
     assert (finding.code, finding.line) == ("URDF412", 2 * MANY + 3)
     codes = {finding.code for finding in timed(chain(mimic=True))}
-    assert codes == {"URDF524", "URDF525"}
+    assert codes == {"URDF525"}
 
 
 @pytest.mark.long
@@ -267,7 +269,7 @@ def test_limits_with_the_remedy_for_a_mimic_joint_have_no_finding(offset: float)
         assert not [one for one in check(corrected) if one.code == "URDF527"]
 
 
-@pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) -> None:
     limit = urdfs.limit()
     text = urdfs.robot(
@@ -275,14 +277,23 @@ def test_pinocchio_accepts_the_remedy_for_a_continuous_mimic_joint(kind: str) ->
         urdfs.joint("b", "continuous", "l1", "l2", more=limit + '<mimic joint="a"/>'),
     )
     (finding,) = [one for one in check(text) if one.code == "URDF524"]
-    both = finding.remedy == 'write type="revolute" for both joints'
-    corrected = (
-        text.replace('"continuous"', '"revolute"')
-        if both
-        else text.replace('name="b" type="continuous"', 'name="b" type="revolute"')
-    )
+    assert finding.remedy == 'write type="revolute" for the mimic joint'
+    corrected = text.replace('name="b" type="continuous"', 'name="b" type="revolute"')
     assert not [one for one in check(corrected) if one.code == "URDF524"]
     assert pin.buildModelFromXML(corrected, mimic=True).nq == 1
+
+
+def test_a_mimic_rule_between_two_continuous_joints_has_no_finding_because_pinocchio_applies_it() -> None:
+    rule = '<mimic joint="a" multiplier="2" offset="0.3"/>'
+    text = urdfs.robot(
+        urdfs.joint("a", "continuous", "l0", "l1"), urdfs.joint("b", "continuous", "l1", "l2", more=rule)
+    )
+    assert check(text) == []
+    model = pin.buildModelFromXML(text, mimic=True)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.array([math.cos(0.7), math.sin(0.7)]))
+    tip = data.oMf[model.getFrameId("l2")].homogeneous
+    np.testing.assert_allclose(tip, urdfs.loaded(text).placement([0.7], "l2"), atol=1e-14)
 
 
 def test_a_free_mimic_joint_can_have_limits_that_exclude_zero() -> None:

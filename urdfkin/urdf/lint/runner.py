@@ -30,9 +30,8 @@ from urdfkin.urdf.lint.rules.joints import (
     check_suspicious,
 )
 from urdfkin.urdf.parser import read_document, read_robot
-from urdfkin.urdf.reader import check_root_joint
 from urdfkin.urdf.records import DEFAULT_SIZE_LIMITS, RobotRecord, SizeLimits
-from urdfkin.urdf.sources import Source, UrdfText, read_source
+from urdfkin.urdf.sources import Source, UrdfText, check_root_joint, read_source
 
 
 def check(

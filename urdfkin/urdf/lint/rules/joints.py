@@ -416,17 +416,11 @@ class _MimicChecker:
             if abs(value) > MAX_MIMIC_NUMBER:
                 message = f"the {attribute} is far too large"
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
-        if joint.kind == "continuous":
-            message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
-            # Pinocchio also refuses a revolute mimic of a continuous joint.
-            both = mimicked_joint.kind == "continuous"
-            remedy = f'write type="revolute" for {"both joints" if both else "the mimic joint"}'
+        if (joint.kind == "continuous") != (mimicked_joint.kind == "continuous"):
+            name = "mimic" if joint.kind == "continuous" else "mimicked"
+            message = f"Pinocchio refuses the rule (mimic=True): only the {name} joint is continuous"
+            remedy = f'write type="revolute" for the {name} joint'
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
-        elif mimicked_joint.kind == "continuous":
-            message = "Pinocchio refuses the rule (mimic=True): only the mimicked joint is continuous"
-            self.add(
-                MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimicked joint'
-            )
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
             remedy = "name a joint that is not a mimic joint; some readers apply only one rule"
