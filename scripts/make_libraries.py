@@ -116,7 +116,7 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the figures `before` with new results for the given libraries."""
+    """Replace the results of the given libraries in the figures `before`."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}

@@ -354,7 +354,7 @@ class _ModelBuilder:
                 "the path has no parameters to fit",
                 where=f"{ends[0]} to {ends[1]}",
                 found=f"fit={', '.join(sorted(self.fit))}",
-                remedy="choose a path with a joint, or also fit base or tool",
+                remedy="choose a path with a joint, or add base or tool to the fit",
             )
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
         # Only joint parameters are nearly known before the fit.

@@ -72,8 +72,8 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes (parts of the joint space) in memory. A search with boxes sharpens the"
-    " upper bounds. 0: no search.",
+    help="Maximum number of boxes (parts of the joint space) in memory. More boxes give sharper upper"
+    " bounds. 0 disables the search.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")

@@ -47,7 +47,7 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     "--quantity",
     type=click.Choice(_QUANTITIES),
     help="Quantity that the function or program computes.",
-    show_default="the quantity in the function's name; for a program: jacobian",
+    show_default="the quantity in the function's name; jacobian for a program",
 )
 @frame_option
 @reference_option

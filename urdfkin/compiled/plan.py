@@ -343,7 +343,7 @@ INSTRUCTION_WIDTH = 5
 #: Integer 0: scratch row of the coordinate q.
 #: Integer 1: scratch row of the sine; next row: cosine.
 #: Integer 2: index of the mimic rule's constants.
-#: Integer 3: 1 with a mimic rule, else 0.
+#: Integer 3: whether the joint has a mimic rule (1 or 0).
 ANGLE_WIDTH = 4
 #: Scratch rows 0 and 1: the numbers 0 and 1.
 #: Rows 2 to 17: results of a frame. Row 18: joint angle.

@@ -1,7 +1,7 @@
 """Compile the kinematics of one frame to machine code.
 
-Machine code is the fastest way to compute in urdfkin. The first call of a quantity compiles exported C code.
-The results of this code are compared with Pinocchio. Without a C compiler, urdfkin uses the forward
+Machine code is the fastest way to compute in urdfkin. The first computation of a quantity compiles exported
+C code. The results of this code are compared with Pinocchio. Without a C compiler, urdfkin uses the forward
 recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key contains the C code, compiler, options and processor.

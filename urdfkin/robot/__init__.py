@@ -1738,7 +1738,7 @@ class Robot(Displayable):
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # The hash of a `Reference` is slow.
         # With the default reference, a plain str is the key.
-        # All other keys are tuples with the class of `frame`.
+        # All other keys are tuples, and contain the class of `frame`.
         # `LinkFrame("link:a") == "link:a"`, but their frames can differ.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)

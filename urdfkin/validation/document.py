@@ -307,7 +307,10 @@ class SecondOracle(TypedDict):
     alone: Alone
     undecided: Annotated[
         Count,
-        doc("Number of disagreements without an outlier. None or two of the three pairs of libraries agree."),
+        doc(
+            "Number of disagreements without an outlier: not exactly one of the three pairs of libraries"
+            " agrees."
+        ),
     ]
 
 

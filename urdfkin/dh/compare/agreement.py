@@ -46,7 +46,7 @@ _FIT_SEED, _CHECK_SEED = 1, 2
 #: Otherwise, no differing cells are reported.
 #: A tip error up to `NEGLIGIBLE_ERROR` * reach also suffices.
 _MAX_CELLS_ERROR_FRACTION = 0.5
-#: A mistake's correction must reduce the error to this fraction.
+#: Maximum tip error after the correction of a mistake / error before.
 #: A tip error within the tolerance also suffices.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10

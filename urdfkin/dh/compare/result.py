@@ -21,12 +21,12 @@ from urdfkin.model.tree import Limit, is_bounded
 Parts = list[str | Table | Matrix]
 
 #: Tip errors up to this number count as zero.
-#: Unit: rad, or m per m of reach.
+#: Unit: rad, or metres divided by the reach.
 #: Rounding errors of a fit are far below this number.
 #: Rounding errors of data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
 #: Smallest tip error in `fit_resolution`.
-#: Unit: rad, or m per m of reach.
+#: Unit: rad, or metres divided by the reach.
 _MIN_TIP_ERROR = 1e-12
 #: Factor of half a digit.
 #: Doubles represent most decimal numbers only approximately.

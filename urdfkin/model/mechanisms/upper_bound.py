@@ -656,8 +656,8 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints that affect |D|, and their values.
 
-    The result begins at the first joint that differs. An earlier joint can share a variable with the result.
-    The result then begins at the earlier joint.
+    The result begins at the first joint that differs. An earlier joint can have the same variable as one of
+    these joints. The result then begins at the earlier joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),

@@ -108,8 +108,8 @@ def _find_objections(before: Examination, after: Examination, fixable: list[Find
 def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str, float]) -> Iterator[str]:
     """Yield messages about differences between two robots, at most one for each joint.
 
-    The function compares version, links, and joint values that URDF readers use. `max_rotations` contains the
-    largest permitted rotation (rad) of joint origins. The keys are joint names.
+    The function compares the URDF version, the links, and the joint values that URDF readers use.
+    `max_rotations` contains the largest permitted rotation (rad) of joint origins. The keys are joint names.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"

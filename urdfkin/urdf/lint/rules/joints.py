@@ -541,7 +541,7 @@ NOTICEABLE_DISPLACEMENT = 1e-3
 #: Angles within this tolerance (rad) of k pi are exact.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs (k, n). A rounded k * pi has at least n decimals.
+#: Pairs (k, n): the file's number for k * pi has at least n decimals.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
