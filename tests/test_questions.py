@@ -57,7 +57,7 @@ def _ur5() -> urdfkin.Robot:
 
 
 def _wheel() -> urdfkin.Robot:
-    return urdfkin.load(WHEEL)
+    return urdfs.loaded(WHEEL)
 
 
 def _warned(act: Callable[[], object]) -> str:
@@ -107,7 +107,7 @@ ASKED: dict[QuestionsSection, list[Callable[[], str]]] = {
     QuestionsSection.XACRO: [_raised(_without_xacrodoc), _typed("explain", "unexpanded-xacro")],
     QuestionsSection.GRAVITY: [_typed("acceleration", "--help"), _typed("imu", "--help")],
     QuestionsSection.FLOATING_BASES: [
-        _raised(lambda: urdfkin.load(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
+        _raised(lambda: urdfs.loaded(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
     ],
     QuestionsSection.LOCKED_JOINTS: [
         _raised(lambda: urdfkin.load("panda").with_locked_joints("ready")),

@@ -172,7 +172,7 @@ MISTAKES = {
     "export ur5 --frame ''": "unknown frame ''",
     "plot ur5 --to neutral --frame '' -o a.svg": "unknown frame ''",
     "dh ur5 --compare ur5 --tip ''": "unknown frame ''",
-    "order ur5 --from ''": "cannot be read",
+    "order ur5 --from ''": "unknown convention ''",
     "plot ur5 --trajectory m.csv --duration 2 -o a.svg": "--duration does nothing with --trajectory",
     "plot ur5 --trajectory m.csv --samples 9 -o a.svg": "--samples does nothing with --trajectory",
     "plot ur5 --trajectory m.csv --from ready -o a.svg": "--from does nothing with --trajectory",

@@ -457,7 +457,7 @@ FORGED: dict[str, Any] = {
     "`differences`: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
     "a value is wrong in": lambda d: d["differences"][0].update(metres=0.5),
     "value is wrong in: joint": lambda d: d["differences"][0].update(a=0.5),
-    "or a value is wrong in: joint": lambda d: d["differences"][0].update(detail="alone"),
+    "this difference is missing: link forearm": lambda d: d["differences"][0].update(detail="alone"),
     "an entry is listed twice": lambda d: d["differences"].append(d["differences"][0]),
     "must contain a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
     "must contain a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),

@@ -375,18 +375,18 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return along, p - along
 
 
-@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
     """Return the rotation matrix of a rotation vector.
 
     If the square of the angle is too large for double precision, the function raises RangeError.
     """
     vector = as_vectors(rotation_vector, "rotation_vector")
-    angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
-    S = skew(vector)
-    # np.sinc(x) is sin(pi x) / (pi x), and 1 for x = 0.
-    half = np.sinc(angle / (2.0 * np.pi))
-    R: FloatArray = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
+    with np.errstate(over="ignore", invalid="ignore"):  # RangeError replaces these warnings.
+        angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
+        S = skew(vector)
+        # np.sinc(x) is sin(pi x) / (pi x), and 1 for x = 0.
+        half = np.sinc(angle / (2.0 * np.pi))
+        R: FloatArray = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
     return check_range(R)
 
 
