@@ -49,9 +49,9 @@ def _c_fma() -> Callable[[float, float, float], float]:
 def _fma_without_errors(
     own: Callable[..., float], c: Callable[..., float]
 ) -> Callable[[float, float, float], float]:
-    """Return a fused multiply-add that gives inf or nan.
+    """Return a fused multiply-add without errors.
 
-    `math.fma` raises an error instead.
+    If the result is inf or nan, `math.fma` raises an error. The returned function returns inf or nan.
     """
 
     def fma(x: float, y: float, z: float) -> float:

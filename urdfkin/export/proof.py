@@ -222,7 +222,7 @@ def _make_vectors(
 def _tolerances_and_scales(
     function: Function, part: CallPart, errors: DecimalErrors
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds in eps, and the scales, both (n, numbers)."""
+    """Return the bounds (in eps) and the scales of n samples, as arrays (n, numbers per sample)."""
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)

@@ -535,7 +535,7 @@ MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 #: Some exporters write larger placeholders for joints without limits.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: Displacement (m) above which a rounded angle is a warning.
+#: A warning reports a rounded angle that moves a link by more (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
 #: Angles within this tolerance (rad) of k pi are exact.
