@@ -21,7 +21,7 @@ check:  ## check format, lint, types and changelog
 	mypy
 	python scripts/changelog_gate.py
 
-fast:  ## the quick tests: about 45 seconds on two idle cores
+fast:  ## the quick tests: about 70 seconds on two idle cores
 	pytest -q -n 2 --dist worksteal -m "not slow and not browser"
 
 test: check  ## all checks and tests except the long tests

@@ -248,6 +248,7 @@ def random_chain(kinds: str, seed: int, tip: str = "tip") -> Robot:
     return built(*joints, verify=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", ["RPR", "RPPR", "PPPR", "PRPRPR", "RRPPRR", "RPPPRR"])
 def test_prismatic_joints_between_revolute_joints_need_no_common_names(kinds: str) -> None:
     for seed in range(3):

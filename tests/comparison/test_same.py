@@ -172,6 +172,7 @@ def same_as_own_table(seed: int) -> Sameness:
 
 # The joints of arm 21 are not nearly parallel. The other arms have axes with tilts down to 1e-9 rad.
 # For the arms 5, 16, 22, 43, 50 and 51, only all axes together determine the base and the zero offsets.
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 8, 10, 16, 17, 21, 22, 27, 36, 43, 50, 51, 52])
 def test_an_arm_is_equivalent_to_its_own_table_although_the_frames_differ(seed: int) -> None:
     found = same_as_own_table(seed)
