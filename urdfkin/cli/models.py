@@ -73,7 +73,7 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
     "--boxes",
     type=WholeNumber(0),
     help="Maximum number of boxes (parts of the joint space) in memory. More boxes give sharper upper"
-    " bounds. 0 disables the search.",
+    " bounds. 0: the joint space is not divided into boxes.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")

@@ -234,7 +234,8 @@ class Mistakes:
             yield "the result is transposed", partial(case.expected.swapaxes, 1, 2)
         if len(shape) == 3:
             yield (
-                "the last two axes are exchanged; entry (row, i, j) must be dJ[row, i]/dq[j]",
+                "the last two axes are exchanged; entry (row, i, j) is the derivative of J[row, i] for"
+                " joint velocity j",
                 partial(case.expected.swapaxes, 2, 3),
             )
 
