@@ -60,14 +60,14 @@ _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 @click.option(
     "--strict",
     is_flag=True,
-    help="Exit with 1 if the models are equivalent only after changes of B. The same applies to other"
-    " differences, such as limits, joint types or links.",
+    help="Exit with 1 if the models are equivalent only after changes of B. Also exit with 1 if the command"
+    " lists any other difference, for example of limits, joint types or links.",
 )
 @click.option(
     "--within",
     type=NumberInRange(0.0),
-    help="Largest allowed distance (m) and angle (rad) between matching frames of A and B. The exit code is 0"
-    " only if urdfkin proves this limit.",
+    help="Largest allowed distance (m) and angle (rad) between a frame of A and the same frame of B. The exit"
+    " code is 0 only if urdfkin proves that no distance or angle exceeds this number.",
 )
 @click.option(
     "--boxes",

@@ -195,8 +195,8 @@ class SameCertificate(Header):
     differences: Annotated[
         list[DifferenceEntry],
         doc(
-            "Differences, in order from the base to the tips. The last entries are joints of only one model,"
-            " and links after different moving joints."
+            "Differences, in order from the base to the tips. The list ends with the joints of only one"
+            " model, and the links after different moving joints in A and B."
         ),
     ]
     remarks: Annotated[

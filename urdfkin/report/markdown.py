@@ -46,8 +46,9 @@ def as_markdown(document: Document) -> str:
     foot = [
         "",
         *_cross_check_table(document["robots"]),
-        "The first table has the worst disagreements, in multiples of eps·scale. eps is 2^-52."
-        " scale is the size of the added terms. Rounding errors give 1 to 10.",
+        "The first table has the worst disagreement of each robot for each quantity, in multiples of"
+        " eps·scale. eps is 2^-52, and scale is the size of the terms that are added to compute the number."
+        " Rounding errors give 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",

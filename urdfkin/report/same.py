@@ -195,7 +195,7 @@ def describe_renames(sameness: Sameness) -> list[str]:
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
     joints += [
-        "another order of B's joints has the same motion; joints are compared in the order "
+        "joints of B have a different order, without effect on the motion; joints are compared in the order "
         + ", ".join(names)
         for names in sameness.orders
     ]

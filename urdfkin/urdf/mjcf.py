@@ -289,7 +289,10 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
         aligned, fuses = list(_find_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if with_shapes and fuses:
             if merged := [body for body in aligned if body.bodies]:
-                what = "MuJoCo fuses static bodies into this free body, and then aligns the body's frame"
+                what = (
+                    "MuJoCo fuses static bodies into this free body and aligns the frame with the inertial"
+                    " frame of the fused body"
+                )
                 where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
                 raise InputError(what, where=where, remedy=remedy)
             fused_model = compile_spec(_load_spec(mujoco, source))
@@ -358,7 +361,7 @@ def _has_moving_descendants(body: Any) -> bool:
 def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
     what = "MuJoCo aligns the frame of this free body with the body's inertial frame"
     if not with_shapes:
-        what += "; without shapes and inertias, urdfkin uses the body frame in the file"
+        what += "; the file was read without shapes and inertias, so urdfkin uses the body frame in the file"
     return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 

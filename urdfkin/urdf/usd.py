@@ -557,7 +557,7 @@ class _StageReader:
             scale = -scale
         R = M[:3, :3] / scale
         if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
-            message = "the frame of a prim has shear, but a rigid body has none"
+            message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
             raise InputError(message, where=where, found=self._describe_uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)

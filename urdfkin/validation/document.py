@@ -23,7 +23,9 @@ from urdfkin.system.documents import (
     of_length,
 )
 
-_NULL_MEANING = "null: infinite. Examples: a result is NaN; two different values have the bound 0."
+_NULL_MEANING = (
+    "null: infinite, for example because a result is NaN, or because two different values have the bound 0."
+)
 Units = Annotated[
     NonNegativeFloat | None, doc(f"A disagreement in multiples of eps * scale. {_NULL_MEANING}")
 ]
@@ -99,7 +101,8 @@ class ReportedJoint(TypedDict):
     remaining_range: Annotated[
         ReportedRange | None,
         doc(
-            "Range of joint values with all mimic joints within their limits. null: the joint's whole range."
+            "The joint values for which all mimic joints of this joint are within their limits."
+            " null: the joint's whole range."
         ),
     ]
     locked: NotRequired[
@@ -113,14 +116,14 @@ class ReportedModel(TypedDict):
     name: Annotated[str, doc("The robot's name.")]
     source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
     path: Annotated[str | None, doc("Path of the robot's file; null for a robot given as text.")]
-    sha256: Annotated[Sha256, doc("SHA-256 of the URDF text (UTF-8), or of the MJCF or USD file.")]
+    sha256: Annotated[Sha256, doc("SHA-256 of the URDF's text as UTF-8, or of the MJCF or USD file.")]
     mimic: Annotated[
         bool | None,
-        doc("Whether mimic joints are coupled to their mimicked joints. null: the robot's default."),
+        doc("Whether mimic joints are coupled to the mimicked joints; null: the default of this robot."),
     ]
     root_joint: Annotated[
         Literal["floating", "planar"] | None,
-        doc("Kind of the joint between the world and the root link. null: none."),
+        doc("Kind of the joint between the world and the root link; null: there is no such joint."),
     ]
     nq: Annotated[Count, doc("Number of coordinates (length of q).")]
     nv: Annotated[Count, doc("Number of joint velocities (length of v and of a).")]
@@ -184,7 +187,10 @@ class ReportedDHRow(TypedDict):
     ]
     sense: Annotated[
         Literal[1, -1],
-        doc("Sign of the joint's value in theta or, for a prismatic joint, in d."),
+        doc(
+            "1: the joint's value is added to theta or, for a prismatic joint, to d."
+            " -1: the joint's value is subtracted."
+        ),
     ]
 
 
@@ -212,8 +218,8 @@ class Chain(TypedDict):
     worst: Annotated[
         Units,
         doc(
-            "Largest disagreement with Pinocchio (placement, Jacobian, acceleration), in eps * scale."
-            " null: infinite, or nothing was compared."
+            "Largest disagreement of a table's tip with Pinocchio in placement, Jacobian and acceleration, in"
+            " eps * scale. null: infinite, or nothing was compared."
         ),
     ]
     bound_ratio: Annotated[
@@ -308,8 +314,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of disagreements without an outlier: not exactly one of the three pairs of libraries"
-            " agrees."
+            "Number of disagreements that do not show which library is wrong, because none or two of the three"
+            " pairs of libraries agree."
         ),
     ]
 
@@ -334,13 +340,16 @@ class ReportedCheck(TypedDict):
     histogram: Annotated[
         list[Count],
         doc(
-            "Number of results in each bin. The bins lie between adjacent `histogram_edges`. The first bin is"
-            " below all edges. The last bin is above all edges."
+            "Number of results in each bin. The first bin is below the first of `histogram_edges`, the last"
+            " bin is above the last edge, and every other bin is between two adjacent edges."
         ),
     ]
     subjects: Annotated[
         Literal["frames", "joints", "columns"],
-        doc("Subjects of `worst_by_subject`: frames, joints, or columns of the full Jacobian."),
+        doc(
+            "Meaning of the entries of `worst_by_subject`: one for each frame, for each joint, or for each"
+            " column of the full Jacobian of all joints."
+        ),
     ]
     worst_by_subject: Annotated[list[Units], doc("The largest disagreement of each frame, joint or column.")]
     worst_case: Annotated[
@@ -420,7 +429,7 @@ class ReportedRobot(TypedDict):
     ]
     accuracy: Annotated[
         ReportedAccuracy | None,
-        doc("Result of the accuracy study. null: no option `--accuracy`, or no result."),
+        doc("Result of the accuracy study; null without `--accuracy`, or if the study has no result."),
     ]
 
 
@@ -435,8 +444,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds, without compilation before the first chunk."
-            " For a report from `urdfkin report DIR`: sum of the robots' computing times."
+            "Wall time of the validation in seconds, without compilation before the first chunk. If `urdfkin"
+            " report DIR` makes the report from a store, the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]

@@ -101,11 +101,14 @@ class LineEntry(TypedDict):
     checked: Annotated[Count, doc("Number of results that the oracle confirmed.")]
     worst: Annotated[
         NonNegativeFloat | None,
-        doc("Largest difference from the oracle's result, in eps * scale. null: not finite."),
+        doc(
+            "Largest difference between a result and the oracle's result, in multiples of eps * scale;"
+            " null: this multiple is not finite."
+        ),
     ]
     bound_ratio: Annotated[
         NonNegativeFloat | None,
-        doc("Largest ratio of a difference to its bound. null: not finite."),
+        doc("Largest ratio of a difference to its bound; null: the ratio is not finite."),
     ]
     unchecked: Annotated[Count, doc("Number of results that were returned without a check.")]
 
@@ -120,8 +123,8 @@ class CertificateDocument(Header):
     source_notes: Annotated[
         str,
         doc(
-            "Notes about the conversion to URDF and about locked joints."
-            " Empty for a URDF without locked joints."
+            "Notes about the conversion of the source to URDF, and about locked joints;"
+            " empty for a URDF without locked joints."
         ),
     ]
     oracle: Annotated[str, doc("Name and version of the oracle.")]

@@ -182,7 +182,8 @@ VELOCITY = Quantity(
     units={"linear": "m/s", "angular": "rad/s"},
     command="velocity",
     summary="velocity of a frame",
-    help_text="Linear velocity of the frame's origin (m/s), and angular velocity (rad/s).",
+    help_text="Linear velocity of the frame's origin (m/s), and angular velocity (rad/s), for the joint"
+    " velocities --v.",
     example="urdfkin velocity ur5 --q random --v 1,0,0,0,0,0 --frame tool0",
 )
 JACOBIAN = Quantity(
@@ -200,7 +201,8 @@ JACOBIAN = Quantity(
     heading="J",
     command="jacobian",
     summary="Jacobian of a frame",
-    help_text="Each row is the frame's velocity for one joint velocity of 1. The other velocities are 0.",
+    help_text="Each row of the table is the frame's velocity when one joint velocity is 1 and all others"
+    " are 0.",
     example="urdfkin jacobian panda --q random --seed 1 --frame panda_hand",
 )
 JACOBIAN_RATE = Quantity(
@@ -257,9 +259,9 @@ ACCELERATION = Quantity(
     units={"linear": "m/s^2", "angular": "rad/s^2"},
     command="acceleration",
     summary="classical acceleration of a frame",
-    help_text="Second derivative of the origin's position (m/s^2), and angular acceleration (rad/s^2)."
-    " Gravity is not included. --breakdown lists four terms of each joint (eq. 7.125): transverse,"
-    " centripetal, Coriolis and sliding."
+    help_text="Second derivative of the position of the frame's origin (m/s^2), and angular acceleration"
+    " (rad/s^2). --v and --a are the joint velocities and accelerations. Gravity is not included. --breakdown"
+    " lists the transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
     f" {QuestionsSection.TWO_ACCELERATIONS}, {QuestionsSection.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --breakdown",
 )

@@ -401,7 +401,9 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
     elif comparison.is_exact_unfitted:
         parts.append("Every cell agrees with the URDF.")
     elif comparison.is_exact:
-        parts.append("After the fit, every compared cell agrees with the URDF.")
+        parts.append(
+            "After the fit of base, tool and joint offsets, every compared cell agrees with the URDF."
+        )
     if comparison.not_compared and not comparison.is_exact_unfitted:
         cells = ", ".join(f"{cell}{row + 1}" for row, cell in comparison.not_compared)
         same = "a change of base, tool or joint offsets has the same effect"

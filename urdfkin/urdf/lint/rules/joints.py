@@ -423,7 +423,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = "name a joint that is not a mimic joint; some readers apply only one rule"
+            remedy = "name a joint that is not a mimic joint; some readers apply only one rule of a chain"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
