@@ -314,8 +314,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of disagreements that do not show which library is wrong, because none or two of the three"
-            " pairs of libraries agree."
+            "Number of disagreements that do not show which library is wrong, because none or two of the"
+            " three pairs of libraries agree."
         ),
     ]
 
