@@ -108,8 +108,8 @@ def test_a_tiny_change_of_a_joint_is_reported() -> None:
     joint["placement"][2][3] += 1e-11
     joint["axis"] = [0.0, math.sin(1e-11), math.cos(1e-11)]
     told = {change.what.rpartition(", ")[2]: str(change) for change in compare(arms(), new).changes}
-    assert told["origin"].endswith(": moved by 10 pm, rotated by 0 rad")
-    assert told["axis"].endswith("rotated by 10 prad")
+    assert told["origin"].endswith(": moved by 1e-11 m, rotated by 0 rad")
+    assert told["axis"].endswith("rotated by 1e-11 rad")
 
 
 def test_a_changed_mimic_rule_and_a_missing_or_new_joint_are_reported() -> None:

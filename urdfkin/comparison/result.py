@@ -38,12 +38,10 @@ from urdfkin.system.lazy_import import get_hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: Values from 0.9 (m or rad) have no unit prefix.
-#: Smaller values: the first prefix of m, µ, n, p.
-#: The number before the prefix must be at least 0.1.
-#: 0.0001 m -> 0.1 mm, 0.00005 m -> 50 µm.
-#: Values below 0.1 pm have no prefix.
-#: The limits are 0.05 % below 0.9 and below 0.1.
+#: Values of at least 0.9 (m or rad) have no unit prefix. A smaller value has the first of the prefixes m, µ
+#: and n with which its number is at least 0.1: 0.0001 m is 0.1 mm, and 0.00005 m is 50 µm. Values below
+#: 0.1 nm have no prefix, because few readers know picoradians: 4e-12 rad. The two limits are 0.05 % smaller,
+#: because the numbers are rounded to four digits.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
@@ -624,8 +622,8 @@ def _have_equal_motion(a: Joint, b: Joint) -> bool:
 def length(metres: float) -> str:
     """Return a length as text with a unit prefix.
 
-    >>> length(0.0019), length(math.inf)
-    ('1.9 mm', 'without bound')
+    >>> length(0.0019), length(4.7e-12), length(math.inf)
+    ('1.9 mm', '4.7e-12 m', 'without bound')
     """
     return _with_prefix(metres, "m")
 
@@ -653,10 +651,10 @@ def _with_prefix(value: float, unit: str) -> str:
         return "without bound"
     if value == 0.0:
         return f"0 {unit}"
-    for prefix, factor in (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9), ("p", 1e12)):
+    for prefix, factor in (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)):
         if abs(value) * factor >= (_LEAST_WITH_PREFIX if prefix else _LEAST_WITHOUT_PREFIX):
             return f"{value * factor:.4g} {prefix}{unit}"
-    return f"{value:.2g} {unit}"
+    return f"{value:.4g} {unit}"
 
 
 def size_words(metres: float, radians: float) -> str:
