@@ -4,8 +4,8 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The last column is the code's data rate (bytes read and written per second),
-divided by the data rate of a copy within the GPU's memory.
+median of several launches. The data rate is the number of bytes that are read and written per second.
+The last column is the code's data rate, divided by the data rate of a copy within the GPU's memory.
 
 If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
 `torch.compile`. If PyTorch Kinematics is installed too, the program also measures the Jacobian of PyTorch

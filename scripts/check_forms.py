@@ -165,8 +165,8 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 RUN: dict[str, Run] = {
     **{form: partial(run_in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": run_in_c,
-    # Octave uses substitutes for the toolbox's classes.
-    # `matlab-rst` has not been run in MATLAB.
+    # Octave runs `matlab-rst` with substitutes for the classes of MATLAB's Robotics System Toolbox. This
+    # format has not been run in MATLAB.
     **{form: partial(run_in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
     **{form: partial(read_written_table, form) for form in ("toml", "json", "csv")},
     "urdf": load_as_urdf,

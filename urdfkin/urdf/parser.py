@@ -550,7 +550,8 @@ class NumberReader:
 #: Tags that messages about invalid numbers omit.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
+#: Leading zeros of a character reference. The zeros are removed, because `html.unescape` fails for thousands
+#: of zeros.
 _LEADING_ZEROS_OF_REFERENCE = re.compile(r"(&#[xX]?)0+")
 
 #: Patterns of invalid numbers, with remedies. The first matching pattern determines the remedy.

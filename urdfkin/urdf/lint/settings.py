@@ -282,8 +282,8 @@ def find_known_findings(
     Return None if the older version certainly has all current findings. All findings of an unchanged file are
     known, with two exceptions:
 
-    - All findings of a xacro file are new if a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed,
-      because the xacro file may include the changed file.
+    - All findings of a xacro file are new if a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed.
+      The reason is that the xacro file may include the changed file.
     - All findings about missing meshes are new if the URDF contains the name of a file that was deleted.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)

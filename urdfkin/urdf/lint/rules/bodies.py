@@ -15,8 +15,7 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest plausible mass, kg.
-#: Largest plausible coordinate of a centre of mass, m.
+#: Largest plausible mass (kg), and largest plausible coordinate of a centre of mass (m).
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
 #: A nonzero mass (kg) below this number is probably a placeholder, so the moments of inertia of the body are

@@ -189,8 +189,7 @@ ATTRIBUTES = {
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
 _POSE_NAMES_OF_OTHER_FORMATS = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Names that URDF, a simulator or another format defines.
-#: `--fix` does not remove attributes with these names.
+#: Names that URDF, a simulator or another format defines. `--fix` keeps attributes with these names.
 _KEPT_ATTRIBUTES = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_OF_OTHER_FORMATS | VENDOR_NAMES
 
 #: Child elements that may occur only once.
