@@ -130,7 +130,7 @@ def _serialize(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                # The copy omits comments and processing instructions. In ElementTree, their tags are functions.
+                # The copy omits comments and processing instructions, because their tags are functions.
                 if isinstance(child.tag, str):
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
