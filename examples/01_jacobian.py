@@ -1,7 +1,7 @@
-"""Compute the Jacobian at a pose with named joints, and interpret a column.
+"""Compute the Jacobian at a pose that is given by joint names, and interpret one of its columns.
 
-You learn how to name joints and which units apply. You also learn the order of rows and columns, and how
-results are checked.
+You learn how to name joints, which units apply, how rows and columns are ordered, and how results are
+checked.
 """
 
 import numpy as np
@@ -9,9 +9,9 @@ import numpy as np
 import urdfkin
 
 robot = urdfkin.load("panda")  # The argument is a name, a path, or URDF text.
-# The text changes three joints of the configuration `neutral`.
-# `-30deg` is in degrees; `1.5` and `-2*pi/3` are in radians.
-# You can also pass a mapping from joint names to values.
+# The text describes a configuration: three joints have the given values, and the other joints have the values
+# of `neutral`. An angle without a unit is in radians; `-30deg` is in degrees; `-2*pi/3` is a multiple of pi.
+# Instead of a text, you can pass a mapping from joint names to values.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
 J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85

@@ -1,7 +1,7 @@
 """Derive the Denavit-Hartenberg table of a URDF, and print the table as Markdown.
 
-You learn that `snap` rounds the URDF's angle 1.57079632679 to a right angle. By default, urdfkin compares
-each table with Pinocchio.
+You learn that `snap` rounds an angle of 1.57079632679 in the URDF to a right angle. By default, urdfkin
+compares each table with Pinocchio.
 """
 
 import numpy as np

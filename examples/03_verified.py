@@ -1,7 +1,7 @@
 """Compare urdfkin's results with Pinocchio's results, and print the certificate.
 
-You learn how `verify` selects the checked results of a call: all, a sample, or none. You also learn that
-`certificate()` counts checked and unchecked results.
+You learn how the argument `verify` chooses which results of a call are checked: all, a sample, or none. You
+also learn that `certificate()` counts checked and unchecked results.
 """
 
 import urdfkin

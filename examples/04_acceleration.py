@@ -1,6 +1,6 @@
 """Split an acceleration into its transverse, centripetal, Coriolis and sliding parts, by joint.
 
-You learn that accelerations are classical. The acceleration is the sum of the terms of equation 7.130.
+You learn that accelerations are classical, and that the terms of equation 7.130 add up to the acceleration.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""Compute a hundred thousand Jacobians in one call, into an existing array.
+"""Compute a hundred thousand Jacobians in one call, and write them into an existing array.
 
-You learn that all methods for quantities accept arrays with leading batch axes. `out=` avoids the allocation
-of a result. `verify="sample"` checks only 100 configurations, which saves time.
+You learn that every method that computes a quantity accepts arrays with leading batch axes. `out=` avoids the
+allocation of a result. `verify="sample"` checks only 100 configurations, which saves time.
 """
 
 import time

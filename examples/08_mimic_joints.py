@@ -1,7 +1,7 @@
 """Compute with mimic joints: one finger of a gripper mimics the other finger.
 
-You learn that the vector `q` contains no mimic joints. A mimicked joint's column of the Jacobian includes the
-mimic joint's motion. With `mimic=False`, mimic joints are independent joints.
+You learn that the vector `q` contains no mimic joints. In the Jacobian, the column of the mimicked joint
+includes the motion of the mimic joint. With `mimic=False`, mimic joints are independent joints.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
-You learn that table and URDF may have different base frames, tool frames and joint zeros. The function
-`compare` first fits these frames and zeros. Then `compare` computes the largest distance between the tips of
-table and URDF. `compare` also lists the table's cells that differ.
+You learn that the table and the URDF may have different base frames, tool frames and zero positions of the
+joints. The function `compare` first fits the two frames and the zero positions. Then `compare` computes the
+largest distance between the table's tip and the URDF's tip, and lists the cells of the table that differ.
 """
 
 from dataclasses import replace
@@ -12,13 +12,13 @@ from urdfkin.dh.compare import compare
 from urdfkin.dh.parse_table import reference_path
 
 robot = urdfkin.load("ur5")
-published = urdfkin.read_table(reference_path("ur5"))  # or the path of your own table
+published = urdfkin.read_table(reference_path("ur5"))  # The argument can also be the path of your own table.
 path = robot.chain("tool0", "base")
 
 found = compare(path, published)
 print(f"as published: agrees {found.agrees}, {1e3 * found.metres:.2g} mm at the tip at most")
 
-# Add 1 mm to the third row's cell `a`. `compare` finds this cell.
+# Add 1 mm to the cell `a` of the third row. `compare` finds this cell.
 rows = list(published.rows)
 rows[2] = replace(rows[2], a=rows[2].a + 1e-3)
 found = compare(path, replace(published, rows=tuple(rows)))

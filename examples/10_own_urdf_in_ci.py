@@ -1,7 +1,7 @@
-"""Check your own URDF in CI: the text, then all quantities against Pinocchio.
+"""Check your own URDF in CI: first its text, then every quantity of every frame against Pinocchio.
 
-You learn that `check` checks a URDF's text. `validate` checks urdfkin's numbers. On the command line, use
-`urdfkin check` and `urdfkin validate`.
+You learn that the function `check` checks the text of a URDF, and `validate` checks urdfkin's numbers. On the
+command line, use `urdfkin check` and `urdfkin validate`.
 """
 
 import urdfkin

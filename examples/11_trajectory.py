@@ -1,7 +1,6 @@
-"""Find a frame's largest velocity and acceleration, and its smallest singular value.
+"""Find a frame's largest velocity, largest acceleration and smallest singular value along a trajectory.
 
-You learn to make a straight joint motion from rest to rest. You also learn to compute and check a frame's
-motion.
+You learn to make a straight joint motion from rest to rest, and to compute and check the motion of a frame.
 """
 
 import numpy as np

@@ -1,13 +1,13 @@
-"""Check reports, comparisons, the site and the viewer in Chromium.
+"""Check reports, comparisons, the documentation site and the viewer in Chromium.
 
-Each page is opened at four widths, in two themes (light and dark). The script runs the accessibility checker
-axe, and reports serious violations. The script also reports console errors, sideways scrolling and requests
-to other hosts. The script also moves through the page with the Tab key. Further steps check the HTML, and
-print the page to a PDF. `--output` saves pictures of all screens and of the printed pages.
+Each page is opened at four widths, in a light and a dark theme. The script runs the accessibility checker
+axe, and reports serious violations, errors in the console, sideways scrolling and requests to other hosts.
+The script also moves through the page with the Tab key, checks the HTML, and prints the page to a PDF.
+`--output` saves pictures of all screens and of the printed pages.
 
 The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. Three tools are
-optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils. Debian's poppler-utils
-converts the PDF's pages to pictures.
+optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils, which converts the pages
+of the PDF to pictures.
 
     npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
     python -m scripts.audit_pages --output /tmp/audit
@@ -50,8 +50,7 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 ROOT = Path(__file__).parents[1]
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
-#: Time limit of axe-core, in seconds.
-#: For 100,000 elements of a page, axe-core needs 30 seconds.
+#: Time limit of axe-core, in seconds. axe-core needs half a minute for a page of 100,000 elements.
 _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
@@ -61,7 +60,7 @@ _PRESSES = 60
 #: Maximum number of PDF pages that become pictures.
 _PAGES = 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Without a mouse, the site's theme hides some elements.
+#: The site's theme hides some elements if Chromium reports no mouse.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -74,14 +73,14 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: JavaScript that lists tables that are wider than their box.
-#: Each item contains a table's name, width and available width.
+#: JavaScript that returns the name, the width and the available width of each table that is wider than its
+#: box.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: JavaScript that describes the element with the focus.
-#: `shown` states whether an outline or shadow marks the element.
+#: JavaScript that returns the tag and name of the focused element, and three facts: whether an outline or a
+#: shadow marks the element, whether it has an area, and whether it has a name.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -91,8 +90,7 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript that removes the focus from the focused element.
-#: The result states whether the element's border changes.
+#: JavaScript that returns whether the border of the focused element changes when it loses the focus.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -109,7 +107,7 @@ class Page:
     ready: str = ""
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
-    whole: bool = True  # also check keyboard, HTML and PDF
+    whole: bool = True  # whether keyboard, HTML and PDF are checked, not only screens
 
 
 def read_axe_script() -> str | None:
@@ -212,7 +210,7 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
         Viewer(server, robot, q, make_line_trajectory(robot, q, -q, 2.0, 20) if plays else None)
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
-        ready = (  # A phone hides the controls.
+        ready = (  # The viewer hides its controls on a phone.
             "return !!document.querySelector('canvas')"
             " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
         )
@@ -259,7 +257,7 @@ def check_screen(
     ]
     if output is not None:
         for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-            # The browser draws only visible 3D views.
+            # The browser draws a 3D view only while it is visible.
             browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
             browser.settle()
         browser.js("scrollTo(0, 0)")
@@ -349,8 +347,8 @@ def main() -> None:
         return name.startswith(tuple(arguments.only))
 
     def audit_page(browser: Browser, page: Page) -> None:
-        # The site stores the theme of the first visit.
-        # Every new page must start without a stored theme.
+        # The site stores the theme of the first visit, so this script clears the storage before each page
+        # loads.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
         page_faults = audit(browser, page, arguments.output, axe, jar)

@@ -1,13 +1,14 @@
-"""Compare the speed of urdfkin, Pinocchio and other libraries, in one process.
+"""Compare the speed of urdfkin, Pinocchio and other libraries for the same computations, in one process.
 
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
 The script first compares the results of all libraries, and fails if they differ. Each round then times every
-library once. Ratios are therefore reliable under other load, but absolute times are not. The script prints
-medians, minima and ratios of medians. A library that is not installed is listed, but not measured.
+library once. Ratios are therefore reliable even on a machine with other load, but absolute times are not. The
+script prints medians, minima and ratios of medians. A library that is not installed is listed, but not
+measured.
 
-The section `where` measures the time of each step, for a batch and for a single call. The section `first`
-measures each quantity's first call, in a new process.
+The section `where` measures the time of each step of a batch, and of each step of a single call. The section
+`first` measures the first call of each quantity, in a new process.
 """
 
 import argparse
@@ -21,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # Import urdfkin and `scripts` from this checkout.
-# Otherwise, idle threads of PyTorch make other libraries slower.
+# Without this setting, idle threads of PyTorch make other libraries slower.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from scripts.benchmarking import sections as measured
@@ -42,7 +43,7 @@ class BenchmarkSize:
     rounds: int = 21
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # approximate number of Jacobian elements per batch (`joints`)
+    numbers: int = 4_000_000  # approximate number of Jacobian elements per batch, in the section `joints`
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames in one pass
     frame_configurations: int = 4_000  # configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches

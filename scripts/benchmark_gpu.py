@@ -4,18 +4,18 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The data rate is the number of bytes that are read and written per second. The
-last column is the code's data rate, divided by the data rate of a copy. The copy is within the GPU's memory.
+median of several launches. The data rate is the number of bytes that are read and written per second.
+The last column is the code's data rate, divided by the data rate of a copy within the GPU's memory.
 
-If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch. This code runs
-with and without `torch.compile`. The program also measures the Jacobian of PyTorch Kinematics, if installed.
-Before the measurements, the program checks results of PyTorch Kinematics. The program also checks the
-exported code without `torch.compile`.
+If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
+`torch.compile`. If PyTorch Kinematics is installed too, the program also measures the Jacobian of PyTorch
+Kinematics. Before the time measurements, the program checks results of two contenders: the exported code
+without `torch.compile`, and PyTorch Kinematics.
 
 The program needs nvcc, which `make nvcc` installs into the checkout's environment.
 
-The exit code is 1 if a number is outside its error bound. The exit code is 2 without a GPU or nvcc, or if the
-program does not compile.
+The exit code is 1 if a number is outside its error bound. The exit code is 2 if there is no GPU or no nvcc,
+or if the program does not compile.
 """
 
 import argparse
@@ -49,8 +49,7 @@ SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
 #: Number of timed launches per measurement.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
-#: Maximum allowed error of PyTorch Kinematics.
-#: PyTorch Kinematics reads a URDF's angles in single precision.
+#: Maximum allowed error of PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"

@@ -5,9 +5,9 @@
 
 The script builds the sdist from the checkout and the wheel from the sdist. The script builds twice and
 compares the bytes. Then `twine check --strict` and `check-wheel-contents` check the sdist and the wheel. The
-SBOM (CycloneDX, JSON) lists the packages in a new virtual environment with the wheel. The option `--sbom-of
-PYTHON` takes an existing environment instead, without network. SHA256SUMS has one line for each file. Exit 1:
-a check fails.
+SBOM (CycloneDX, JSON) lists the packages of a new virtual environment in which the wheel is installed. With
+`--sbom-of PYTHON`, the SBOM lists an existing environment instead, and the script needs no network.
+SHA256SUMS has one line for each file. Exit 1: a check fails.
 """
 
 import argparse
@@ -84,8 +84,8 @@ def main() -> None:
     files = build(options.folder.resolve())
     check_reproducible(files)
     _run(sys.executable, "-m", "twine", "check", "--strict", *files)
-    # The wheel contains the licence of three.js in two folders.
-    # check-wheel-contents would report these equal files (W002).
+    # The wheel contains the licence of three.js twice: in the package, and in the folder of licences.
+    # check-wheel-contents reports equal files as W002, so this code is ignored.
     _run(sys.executable, "-m", "check_wheel_contents", "--ignore", "W002", files[1])
     sbom = options.folder / f"urdfkin-{read_version()}.cdx.json"
     write_sbom(files[1], sbom.resolve(), options.sbom_of)

@@ -2,10 +2,10 @@
 
     python scripts/changelog_gate.py [--base REVISION]
 
-The base is the commit where the branch left `main` (or `origin/main`). Files that were only moved do not
-count as changed. If no user notices the change, add `No-changelog: <reason>` to a commit message. Without
-`--base`, the script may find no base (on main, in a shallow clone). The script then prints "changelog not
-checked" and the reason. The exit code is 0.
+The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
+count as changed. If no user notices the change, add the line `No-changelog: <reason>` to a commit message of
+the branch. Without `--base`, the script finds no base in some cases, for example on main or in a shallow
+clone. The script then prints "changelog not checked" with the reason, and exits with code 0.
 """
 
 import argparse
@@ -53,9 +53,10 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
     except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
-    # ADDED and DELETED are numbers of lines.
-    # Entry: ADDED TAB DELETED TAB PATH NUL
-    # Moved file: ADDED TAB DELETED TAB NUL OLD_PATH NUL NEW_PATH NUL
+    # ADDED and DELETED are numbers of lines. git prints one entry for each changed file:
+    #     ADDED TAB DELETED TAB PATH NUL
+    # The entry of a moved file has two paths:
+    #     ADDED TAB DELETED TAB NUL OLD_PATH NUL NEW_PATH NUL
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))

@@ -5,14 +5,14 @@
     python scripts/check_bits.py --against before.npz  # also compare with stored results
 
 The script checks every robot of the catalogue, every quantity and all three reference frames. The kinds of
-calls are single calls, prepared evaluators, batches, and several frames in one pass. The script also compares
-plain Python. Fused multiply-adds are explicit, and urdfkin has its own sine and cosine. Digests are therefore
-equal on every machine. For different results, the script prints the largest difference, divided by the stored
+calls are single calls, prepared evaluators, batches, several frames in one pass, and plain Python. Fused
+multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine. If
+results differ from the stored results, the script prints the largest difference as a fraction of the stored
 bound.
 
-Exit 1: a result is not finite, or differs from a stored result, or calls with equal inputs return different
-bits. The option `--within 0.1` allows larger differences from stored results, up to 0.1 times the error
-bound.
+Exit 1: a result is not finite, calls with the same inputs return different bits, or a result differs from the
+stored result. With the option `--within 0.1`, a difference from the stored result is allowed up to 0.1 times
+the result's error bound.
 """
 
 import argparse
@@ -44,9 +44,9 @@ from urdfkin.verify.verifier import compute_bound
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch. None means urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Maximum numbers of stored configurations and frames per robot.
+#: Maximum numbers of stored configurations and frames for each robot.
 STORED, STORED_FRAMES = 9, 6
-#: Index of the configuration that Python and kernels compute.
+#: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED_INDEX = 3
 MODES: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
@@ -99,7 +99,7 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 
 
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
-    """Yield a message for each difference from single calls and each non-finite result."""
+    """Yield a message for each difference from a single call, and for results that are not finite."""
     frame = subject.frames[0]
     for call_name, quantity, reference, inputs in subject.calls():
         stored_inputs = [x[:STORED] for x in inputs]
@@ -160,13 +160,13 @@ def digest(now: Arrays) -> str:
 
 
 def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the largest difference from stored results, divided by the stored bound."""
+    """Return the largest difference from the stored results, divided by the stored error bound."""
     if have_equal_bits(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # 0 and -0 are equal, but their bits differ.
+    # 0 and -0 are equal, but their bits differ, so the ratio must not be 0.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

@@ -5,9 +5,9 @@
 
 Half of an arm's axes are at most 1 mm and 1e-3 rad from the previous axis (`nearly_coincident` in
 `tests/dh/test_compare.py`). For each arm, the script makes a standard and a modified table. For the first 400
-arms, the script also makes a strict table. Signs and zeros of all tables differ from the arm's. The tables
-have no base and tool. Each table must agree with its arm. For the first 400 arms, `urdfkin same` compares arm
-and standard table. The script counts the verdicts.
+arms, the script also makes a strict table. Each table has other signs and joint zeros than the arm, and has
+no base and no tool. Each table must agree with its arm. For the first 400 arms, `urdfkin same` also compares
+the arm with its standard table, and the script counts the verdicts.
 
 Exit 1: a table differs from its arm.
 """

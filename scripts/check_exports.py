@@ -13,9 +13,9 @@
 
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. GCC and Clang compile the C code; a missing compiler is skipped. The
-compiled programs compute single configurations and batches. NumPy runs the formats `numpy` and `array` in
-double precision. For `array`, NumPy also uses single precision. GCC compiles CUDA's host functions. The leaf
-links have a fixed random order. A stopped run has therefore checked a random sample.
+compiled programs compute single configurations and batches. NumPy runs the format `numpy` in double
+precision, and the format `array` in double and single precision. GCC compiles CUDA's host functions. The leaf
+links have a fixed random order, so that a stopped run has checked a random sample.
 
 Exit 1: an error exceeds its bound, a function is not verified, or a compiler prints a warning.
 """
@@ -51,9 +51,9 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: Maximum nv for Hessians in the formats `torch` and `jax`.
-#: With JAX, the format `array` is checked without a Hessian.
-#: JAX would compile this Hessian for minutes.
+#: Maximum number of joint velocities of a robot for the slow check of its Hessian in the formats `torch` and
+#: `jax`. With JAX, the format `array` is checked without a Hessian, because JAX would compile the Hessian for
+#: minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 

@@ -5,8 +5,9 @@
     python scripts/check_forms.py --toolbox PYTHON     # another interpreter, with roboticstoolbox
     python scripts/check_forms.py --forms sympy latex  # some formats only
 
-LaTeX tables are compiled and must fit on the page of an article. Without its interpreter or library, a format
-is not run. Exit 1: results of a format differ by more than rounding, or a LaTeX table is too wide.
+LaTeX tables are compiled and must fit on the page of an article. The code of a format is not run if its
+interpreter or library is missing. Exit 1: results of a format differ by more than rounding, or a LaTeX table
+is too wide.
 """
 
 import argparse
@@ -43,8 +44,8 @@ from urdfkin.urdf.catalogue import example_robot_data_names
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
-#: Limits for `matlab-symbolic`: number of tables, rows of a table.
-#: For six joints, Octave's symbolic package takes 20 s.
+#: Maximum numbers of tables, and of rows per table, for the format `matlab-symbolic`, because Octave's
+#: symbolic package takes 20 s for six joints.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the Octave program, for each format.
@@ -76,9 +77,8 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: A function that runs the code of all jobs.
-#: The result contains the poses of each job.
-#: The function may write into the folder.
+#: A function that runs the code of all jobs, and returns the poses of each job. The function may write into
+#: the folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -137,7 +137,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # `re.sub` removes the Python version that `symbolic` prints.
+    # Octave's package `symbolic` also prints the version of Python; `re.sub` removes this line.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -154,7 +154,7 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        with warnings.catch_warnings():  # hide warnings about limits and axes
+        with warnings.catch_warnings():  # hide warnings about the robot's limits and axes
             warnings.simplefilter("ignore", urdfkin.UrdfWarning)
             path = urdfkin.load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]
@@ -165,8 +165,8 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 RUN: dict[str, Run] = {
     **{form: partial(run_in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": run_in_c,
-    # Octave uses substitutes for the toolbox's classes.
-    # `matlab-rst` has not been run in MATLAB.
+    # Octave runs `matlab-rst` with substitutes for the classes of MATLAB's Robotics System Toolbox. This
+    # format has not been run in MATLAB.
     **{form: partial(run_in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
     **{form: partial(read_written_table, form) for form in ("toml", "json", "csv")},
     "urdf": load_as_urdf,
@@ -174,7 +174,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return each table's excess width (points); 0 if the table fits."""
+    """Return each table's excess over the width of the text (points); 0 if the table fits."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -216,8 +216,8 @@ class Case:
             Largest difference from urdfkin's pose, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # `rounding` is 0 for a table without lengths.
-        # Sine and cosine still have rounding errors.
+        # `rounding` is 0 for a table without lengths, but sine and cosine have rounding errors, so `allowed`
+        # must not be 0.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

@@ -4,10 +4,11 @@
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. After
-a check that is longer than `--patience`, larger documents of this kind are skipped.
+a check that takes longer than `--patience`, the script skips the larger documents with the same kind of
+content.
 
-Each document repeats one kind of content. Faulty exporters and attackers may write such files. Time and
-memory must be proportional to the file's size, even if urdfkin rejects the file.
+Each document repeats one kind of content, as a file from a faulty exporter or an attacker may do. Even if
+urdfkin rejects the file, the time and memory of the check must be proportional to the file's size.
 """
 
 import argparse
@@ -76,7 +77,7 @@ KINDS: dict[str, Kind] = {
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
     "bad numbers": _robot_with_many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
-    # Inputs with many or long comments `urdfkin: ignore`.
+    # Inputs with many or long comments that suppress findings (`urdfkin: ignore`).
     "comments that suppress no finding": _robot_with_many("<!-- urdfkin: ignore[x{i}] y -->\n"),
     "consecutive comments": _robot_with_many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
@@ -160,7 +161,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return processor time (s) and memory with the findings (MB), per MB of document."""
+    """Return the processor time (s) and the memory with the findings (MB), both per MB of the document."""
 
     def read_usage() -> tuple[float, float]:
         return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

@@ -1,18 +1,18 @@
-"""Check verdicts and distance intervals of `urdfkin same` for changed robots.
+"""Check the verdicts and the distance intervals of `urdfkin same` for changed robots of the catalogue.
 
     python scripts/check_same.py --keep pairs.jsonl          # continues a stopped run
     python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
 
 `tests/comparison/pairs.py` defines twenty-one changes of a robot. The script makes each change alone, in a
-copy of the robot. For eleven of the changes, `same` must find that robot and copy are equivalent. `same` must
-also predict the poses of the copy's matched links. The script tests the predicted poses at random
-configurations. For the other ten changes, `same` must find that robot and copy differ. The change `rounded`
-is an exception. Rounding to four digits leaves some robots unchanged, so every verdict is accepted.
+copy of the robot. For eleven of the changes, `same` must find that robot and copy are equivalent, and must
+predict the poses of matched links in the copy. The script tests the predicted poses at random configurations.
+For the other ten changes, `same` must find that robot and copy differ. The change `rounded` is an exception:
+rounding to four digits leaves some robots unchanged, so every verdict is accepted.
 
-For these ten changes, `same` also returns an interval. The interval contains the largest distance between
-matching frames of robot and copy. An independent global search maximizes the distance. This distance has
-fifty digits, and uses the decimal numbers in the URDF texts. The result must lie in the interval. The script
-skips an infinite interval, and a copy whose base `same` moves.
+For these ten changes, `same` also returns an interval for the largest distance between matching frames of
+robot and copy. An independent global search maximizes the distance, which is computed with fifty digits from
+the decimal numbers in the two URDF texts. The result must lie in the interval. The script skips an infinite
+interval, and a copy whose base `same` moves.
 
 Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
@@ -37,8 +37,7 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of a placement's element.
-#: An element is a coordinate (m) or a rotation entry.
+#: Maximum rounding error of each element of a placement: a coordinate (m) or an entry of the rotation.
 ROUNDING = 1e-10
 
 
@@ -53,8 +52,7 @@ def check_pair(name: str, change: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": change, "verdict": comparison.verdict.value, "seconds": seconds}
     if change in ALIKE:
         return result | {"right": bool(comparison) and moves_alike(comparison, a, b, ROUNDING)}
-    # The change `rounded` leaves some files unchanged.
-    # All verdicts about `rounded` are therefore accepted.
+    # For `rounded`, every verdict is accepted, because rounding leaves some files unchanged.
     result["right"] = comparison.verdict is Verdict.DIFFERS or change == "rounded"
     tools = {tool.b for tool in comparison.tools}
     frames = [frame for frame in comparison.frames if frame.frame_b not in tools and frame.q_a]

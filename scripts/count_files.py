@@ -1,6 +1,7 @@
 """Count the files of urdfkin whose functions run during `load` and during `same`.
 
-A reader of `load` or `same` must open these files. Files that are only imported do not count.
+A reader must open these files to follow a call of `load` or `same`. Files that are only imported do not
+count.
 
     python scripts/count_files.py                # load(A) and same(A, B) for two robots of this repository
     python scripts/count_files.py A.urdf         # load(A)

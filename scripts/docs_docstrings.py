@@ -1,7 +1,8 @@
-"""Make mkdocs show doctests as blocks of code; mkdocs.yml refers to this module.
+"""Extend mkdocs so that doctests in docstrings are shown as blocks of code; mkdocs.yml refers to this module.
 
-The pages show the text of `help()`, for example `help(Robot.jacobian)`. The text of `help()` also describes
-arguments that several methods share. The heading `Example:` is removed, because the site would draw a box.
+The pages show the same text as `help()` of a method, for example `help(Robot.jacobian)`. The text of
+`help()` also describes the arguments that several methods have in common. The heading `Example:` is removed,
+because the site would draw a box around the example.
 """
 
 import inspect
@@ -13,9 +14,9 @@ import griffe
 
 from urdfkin.robot import Robot
 
-#: Matches a heading `Example:` and the indented lines below.
+#: Regular expression for the heading `Example:` of a docstring and the indented lines below.
 _EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
-#: Matches a prompt `>>>` and the following nonblank lines.
+#: Regular expression for a Python prompt `>>>` and all lines up to the next blank line.
 _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 

@@ -1,7 +1,7 @@
-r"""Generate and convert pages of the site; mkdocs.yml refers to these hooks.
+r"""Hooks of mkdocs that generate and convert pages of the documentation site; mkdocs.yml refers to them.
 
-The pages of commands and of the library are generated from the program. A formula between $` and `$ becomes
-MathML. A lesson is also available as a notebook.
+The pages of commands and of the library are generated from the program, so they are always current. A formula
+between $` and `$ becomes MathML. A lesson is also available as a notebook.
 """
 
 import html
@@ -20,8 +20,8 @@ from urdfkin.cli import cli
 LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Maps a page to its title, introduction and described names.
-#: A name without a dot belongs to `urdfkin` or `Robot`.
+#: Maps a page to its title, its introduction, and the names that the page describes. A name without a dot
+#: belongs to the package `urdfkin` or to the class `Robot`.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
@@ -87,11 +87,11 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: Matches GitHub's markup of an image with two themes.
+#: Regular expression for GitHub's markup of an image with a light and a dark version.
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )
-#: MathML of a sine or cosine without brackets: `cos q`.
+#: MathML of a sine or cosine without brackets, for example `cos q`.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
@@ -193,7 +193,7 @@ def make_subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # A method of `Robot` has its own section.
+        # Each method of `Robot` has a section of its own, so the section of `Robot` shows no members.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {find_address(name)}\n    options:\n{lines}")

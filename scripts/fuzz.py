@@ -11,11 +11,11 @@ There are several families of files:
 | names, prefixes, versions, ..., everything | random robots with one or several kinds of unusual content |
 | MJCF | free bodies, equality constraints and default classes; MuJoCo checks them independently |
 
-Each robot passes through `check` and `load`. Every quantity is compared with Pinocchio, in every reference
-frame. The base is near to or far from the origin. A worker process runs the tests. The worker is restarted
-after a crash or a timeout. File i of a family depends only on the seed, the family and i. `--family names
---only i` tests such a file again. After a failure, the file is stored with a note about the failure. Exit 0:
-no failures.
+Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases
+near to and far from the origin, and compared with Pinocchio. The tests run in a worker process, which is
+restarted after a crash or a timeout. File i of a family depends only on the seed, the family and i, so
+`--family names --only i` tests this file again. A file that causes a failure is stored, with a note about the
+failure. Exit 0: no failures.
 """
 
 import argparse
@@ -66,7 +66,7 @@ class Worker:
         self.process: BaseProcess | None = None
 
     def evaluate(self, family: str, number: int) -> tuple[str, str]:
-        """Test a case; crashes and timeouts of the process are results too."""
+        """Test a case; a crash or timeout of the process is a result too."""
         if self.process is None:
             self.start()
         try:

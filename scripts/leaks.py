@@ -1,4 +1,4 @@
-"""Check for leaks: load N robots, and print the memory after each part.
+"""Check for leaks: load N different robots, and print the memory and the open files after each part.
 
 python -m scripts.leaks 10000
 """
@@ -48,8 +48,7 @@ def measure_usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    # Later loads of kernels would look like a leak.
-    # `use_only` loads each kernel at its first use.
+    # `use_only` loads each kernel at its first use, because a later load of a kernel would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

@@ -1,8 +1,8 @@
 """Draw the imports between packages. Write docs/images/architecture.svg and a table in docs/architecture.md.
 
-The file docs/architecture.toml defines the packages and their order. The test tests/test_architecture.py
-checks the imports with this script's functions. Every import counts, also imports for types and inside
-functions. Module names in strings for lazy imports count too.
+docs/architecture.toml defines the packages and their order. tests/test_architecture.py checks the imports
+with the functions of this script. Every import counts: imports for types, imports inside functions, and
+modules that are named in a string for a lazy import.
 """
 
 import ast
@@ -22,7 +22,7 @@ ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
 PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
-#: Modules that may import each foreign library.
+#: Maps a foreign library to the modules that may import the library.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
@@ -85,8 +85,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # `urdfkin.robot.loading` is a module.
-        # `urdfkin.robot.Robot` is a name in the module `urdfkin.robot`.
+        # An imported name is a module (`urdfkin.robot.loading`) or is defined in one (`urdfkin.robot.Robot`).
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()

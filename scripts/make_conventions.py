@@ -1,12 +1,12 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
-For most rows, each library computes a result for a random motion of a robot. The script also computes the
-quantity by several definitions. Exactly one definition must agree with the library's result. The page shows
-this definition. A test checks that the page is current.
+For most rows, each library computes a result for a random motion of a robot, and the script computes the same
+quantity by several definitions. Exactly one definition must agree with the library's result, and the page
+shows this definition. A test checks that the page is current.
 
-The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, each installed
-library first reads all robots of the catalogue. Each library uses its own convention. The script writes the
-results to conventions.toml.
+The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
+first runs each installed library on all robots of the catalogue, and writes the results to conventions.toml.
+Each library uses its own convention.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure
@@ -59,7 +59,7 @@ ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
-#: A robot with two branches, for the order of coordinates.
+#: A robot with two branches, which shows the order of coordinates.
 TREE = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -93,7 +93,7 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: Maps a library's name to a different package name.
+#: Maps a library's name to the name of its package in the package index, if the two names differ.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "rtb": "roboticstoolbox-python",
@@ -113,7 +113,7 @@ def find_definition(found: FloatArray, readings: Readings) -> str:
     return named[0]
 
 
-#: A row: convention, and results of urdfkin, Pinocchio and MuJoCo.
+#: A row of the table: a convention, and the results of urdfkin, Pinocchio and MuJoCo.
 Row = tuple[str, str, str, str]
 
 
@@ -210,7 +210,7 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
             find_definition(theirs, readings),
             mujocos,
         )
-    columns = np.zeros((6, 3))  # MuJoCo's rows `jacp`, then `jacr`
+    columns = np.zeros((6, 3))  # MuJoCo's Jacobian of the body's origin: rows `jacp`, then rows `jacr`
     position = measured.mj_data.xpos[measured.body]
     mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], position, measured.body)
     yield (

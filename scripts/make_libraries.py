@@ -34,9 +34,8 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: load_features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Maximum error of a coordinate (m) or rotation matrix entry.
-#: Rounding errors are below 1e-14.
-#: A feature that a library misreads causes errors above 1e-3.
+#: Tolerance for each element of a pose: a coordinate (m) or an entry of the rotation matrix. Rounding errors
+#: are below 1e-14. If a library misreads an element, the error is above 1e-3.
 TOLERANCE = 1e-9
 #: Time limit of a library's process, s.
 _SECONDS = 60
@@ -116,7 +115,7 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace the results of the given libraries in the figures `before`."""
+    """Return a copy of the figures `before` with new results for the given libraries."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}
@@ -144,7 +143,7 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # Maps a footnote's letter to a documented difference.
+    notes: dict[str, Any] = {}  # Maps a footnote's letter to a difference that a library documents.
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:

@@ -4,10 +4,10 @@
     python scripts/make_pages.py findings accuracy   # some pages
 
 Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
-with the output of this script. The pages on accuracy and enclosures take minutes to compute. Tests therefore
-check only some numbers on these pages. In docs/performance.md, the picture and `figures: ...` show the
-numbers of docs/performance.json. `python scripts/benchmark.py --json docs/performance.json` measures these
-numbers.
+with the output of this script. The pages on accuracy and enclosures take minutes to compute, so tests check
+only some numbers on these two pages. In docs/performance.md, the picture and the parts `figures: ...` show
+the numbers of docs/performance.json. `python scripts/benchmark.py --json docs/performance.json` measures
+these numbers.
 """
 
 import argparse
@@ -55,7 +55,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Maps a warning of a catalogue robot to an explanation.
+#: Maps the code of a warning about a catalogue robot to an explanation.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -67,7 +67,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: Maps an option of `urdfkin check` to default and unit.
+#: Maps an option of `urdfkin check` to its default limit and the unit. The last limit has no option.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),
@@ -126,7 +126,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # Without a description, an entry has its data type's description.
+            # If an entry has no description, the page shows the description of the entry's data type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
@@ -237,13 +237,13 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # steps = largest interval width / distance between doubles
-            # This distance is taken at the quantity's largest absolute value.
+            # `steps` is the largest width of an interval, as a multiple of the distance between doubles at
+            # the largest absolute value of the quantity.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Exact results (width 0) are not counted.
+            # Exact results have intervals of width 0 and are not counted.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")

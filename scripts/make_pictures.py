@@ -1,4 +1,4 @@
-"""Make pictures of reference frames, and screenshots of report and viewer.
+"""Make pictures for the README and the site: the reference frames, and screenshots of report and viewer.
 
 The script needs the extras `plots`, `view` and `test`, and Debian's chromium and chromium-driver.
 """
@@ -93,8 +93,7 @@ def photograph_viewer(folder: Path) -> None:
                     browser.wait("return document.getElementById('fold') !== null")
                     browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
-                # An animation frame takes seconds.
-                # Without this line, the animation would delay the screenshot.
+                # Each animation frame takes seconds, so the script stops the animation before the screenshot.
                 browser.js("window.requestAnimationFrame = () => 0")
                 time.sleep(2)
                 save_screenshot(browser, f"{name}{theme}")

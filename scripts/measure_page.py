@@ -1,7 +1,8 @@
-"""Measure the times to write, open, search and expand a large report in Chromium.
+"""Measure the times to write, open, search and expand a report of thousands of robots in Chromium.
 
-The script validates a few robots, and copies their results under other names. The script prints medians over
-several runs, each with a new browser profile. The script needs Debian's chromium and chromium-driver.
+The script validates a few robots, and copies their results many times under other names. The script
+prints medians over several runs, each with a new browser profile. The script needs Debian's chromium and
+chromium-driver.
 
     python scripts/measure_page.py --robots 2000
 """

@@ -1,4 +1,4 @@
-"""Measure the size of urdfkin's installation, and write it into docs/install.md.
+"""Measure the size of an installation of urdfkin, and write the size into docs/install.md.
 
     python scripts/measure_size.py
 

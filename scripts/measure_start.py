@@ -3,10 +3,10 @@
     python scripts/measure_start.py            # measure, write the table; exit 1 if a time is too long
     python scripts/measure_start.py --rounds 3
 
-Each row of the table is a command that runs in a new process. In each round, every command runs once. A row's
-ratio is a quotient of median times: command / `import numpy, pinocchio`. Other load of the machine increases
-both times, but hardly changes the ratio. The bytecode of all modules already exists, as after an
-installation. A fresh cache is an empty folder for compiled kernels.
+Each row of the table is a command that runs in a new process. In each round, every command runs once. The
+ratio of a row is the command's median time, divided by the median time of `import numpy, pinocchio`. Other
+load of the machine increases both times, but hardly changes the ratio. The bytecode of all modules already
+exists, as after an installation. A fresh cache is an empty folder for compiled kernels.
 """
 
 import argparse
@@ -32,8 +32,8 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 @dataclass(frozen=True)
 class Row:
     name: str  # label of the row on the page
-    arguments: tuple[str, ...]  # arguments of `python`; ROBOT is a URDF path
-    max_ratio: float = math.inf  # maximum time / time of `import numpy, pinocchio`
+    arguments: tuple[str, ...]  # arguments of `python`; the path of a URDF file replaces ROBOT
+    max_ratio: float = math.inf  # time limit, divided by the time of `import numpy, pinocchio`
     empty_cache: bool = False  # Whether the process starts without compiled kernels on disk.
 
 

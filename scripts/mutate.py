@@ -44,9 +44,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Files that Numba compiles; the script skips these files.
-#: Numba reads the source text, not the mutant's syntax tree.
-#: tests/laws/test_mutation.py tests such mutants without Numba.
+#: Files that Numba compiles. The script skips these files, because the script changes syntax trees, but Numba
+#: reads the source text. tests/laws/test_mutation.py tests mutants of these files without Numba.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
     "compiled/machine/sine.py", "compiled/machine/single.py", "compiled/outputs.py", "compiled/recursion.py",
@@ -80,7 +79,7 @@ def _read_tests() -> dict[Path, str]:
 def find_near_tests(path: Path) -> list[str]:
     """Return the test files that mention a module or belong to the module's package.
 
-    For a package without test files, return test_robot.py, tests/verify and tests/laws.
+    If the package has no test files, test_robot.py and the files in tests/verify and tests/laws replace them.
     """
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(
@@ -105,8 +104,8 @@ def find_near_tests(path: Path) -> list[str]:
 @dataclass(frozen=True)
 class NamedMutant:
     claim: str  # the mistake that must be detected
-    #: Full name, for example `urdfkin.dh.snapping.snap_report`.
-    #: For code outside functions, the module's full name.
+    #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`. For code outside functions,
+    #: this is the full name of the module.
     function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`

@@ -1,4 +1,4 @@
-"""Run exported Python files in this interpreter; print a JSON line for each file.
+"""Run exported Python files in this interpreter, and print one JSON line for each file.
 
 The interpreter does not need urdfkin.
 
@@ -6,10 +6,10 @@ The interpreter does not need urdfkin.
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
 The first argument names the library, `torch` or `jax`. The script calls `check`, a function in each file.
-Files of the format `array` use this library. If a file contains a Hessian, the library differentiates the
-file's Jacobian. The derivative must agree with the file's Hessian, within the file's error bounds. For the
-first file of PyTorch code, `torch.compile` compiles all functions except `hessian`. `scripts/check_exports.py
---library` calls this script.
+Files of the format `array` use this library. If a file contains a Hessian, the script differentiates the
+file's Jacobian with the library. The derivative must agree with the expected Hessian that the file contains,
+within the file's error bounds. For the first file of PyTorch code, `torch.compile` compiles all functions
+except `hessian`. `scripts/check_exports.py --library` calls this script.
 """
 
 import importlib

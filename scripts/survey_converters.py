@@ -1,23 +1,23 @@
-"""Convert robots of the catalogue with other tools; `same` compares each result.
+"""Convert robots of the catalogue with other tools, and compare each result with its source by `same`.
 
     python scripts/survey_converters.py TOOL[=PYTHON]... [--robots NAME...]
 
-PYTHON is the interpreter of an environment with the tool (default: this interpreter). For a tool that reads
-MJCF, MuJoCo first converts the URDF to MJCF. A tool that reads USD needs a second tool that writes USD.
-`TOOLS` names the second tool. Modules of usd-core and usd-exchange have equal names. Install each tool in its
-own environment:
+PYTHON is the interpreter of an environment with the tool (default: this interpreter). A tool that reads MJCF
+gets the MJCF file that MuJoCo makes from the URDF. A tool that reads USD needs a second tool, which writes
+the USD file. `TOOLS` names the second tool. Install each tool in its own environment, because usd-core and
+usd-exchange contain modules with equal names:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
 
-The script prints a table with one row for each robot. For one tool, a row shows the verdict of `same` and
-two bounds (see `make_row`). For several tools, a row has one cell for each tool. The cell has a short verdict
-and the bound on the distance. The full verdicts are then printed to standard error. For several tools, `same`
-uses no branch and bound. `same` is then faster, but the bounds may be larger.
+The script prints a table with one row for each robot. For one tool, a row shows the verdict of `same` and two
+bounds (see `make_row`). For several tools, a row has one cell for each tool, with a short verdict and the
+bound on the distance. The script then prints the full verdicts to standard error. For several tools, `same`
+uses no branch and bound, so `same` is faster, but the bounds may be larger.
 
-Converters would search for meshes, so the script removes visuals and collisions. MuJoCo refuses a moving body
-without mass. With the script's options, MuJoCo gives such bodies a small mass. MuJoCo then also corrects
-impossible inertias.
+The script removes visuals and collisions, because a converter would search for the meshes. MuJoCo refuses a
+moving body without mass. The script therefore sets options with which MuJoCo gives such bodies a small mass,
+and corrects impossible inertias.
 """
 
 import argparse
@@ -48,9 +48,9 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    reads: str  # the tool that writes the input; empty: the URDF
-    program: str  # Python code that converts `source`
-    writes: str = ""  # the output's suffix; empty: the program prints the path
+    reads: str  # the tool that writes the input file; empty if the URDF is the input file
+    program: str  # Python code that converts the file `source`
+    writes: str = ""  # end of the output file's path; empty if the program prints the path
 
 
 TOOLS = {
@@ -89,8 +89,7 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Maps the beginning of a verdict to a short form.
-#: The first matching key applies.
+#: Short forms of verdicts. The first key with which a verdict begins determines its short form.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -98,8 +97,7 @@ _SHORT = {
     "not compared": "not readable",
 }
 _QUOTED = 120
-#: With these settings, MuJoCo accepts missing masses.
-#: MuJoCo also accepts impossible inertias.
+#: Settings with which MuJoCo accepts bodies without mass or with impossible inertia.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
 
 
@@ -108,7 +106,7 @@ class RefusalError(Exception):
 
 
 def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Convert a URDF with a tool; return the tool's input file and output file."""
+    """Convert a URDF with a tool; return the file that the tool reads and the file that it writes."""
     reads, program, writes = TOOLS[tool]
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")

@@ -1,4 +1,4 @@
-"""Load all MJCF files below a folder, and count the results for docs/mjcf.md.
+"""Load all MJCF files below a folder, and count the results of the checks for docs/mjcf.md.
 
 pip install --no-deps --target models gymnasium==1.4.0 dm-control==1.0.50
 python scripts/survey_mjcf.py models

@@ -37,8 +37,8 @@ class Contender:
     library: str
     module: str
     calls: Callable[[Workload, str], Iterator[Calls]] | None = None
-    #: Function that yields the timed tasks for batches.
-    #: Without this function, a loop calls the library per configuration.
+    #: Function that yields the timed tasks for batches. Without this function, the benchmark calls the
+    #: library once for each configuration.
     batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 
@@ -169,8 +169,7 @@ def _compute_part(start: int, stop: int) -> None:
     _worker_state["loop"](out, *inputs)
 
 
-# Some libraries order rows or coordinates differently.
-# The measured times exclude a conversion of the order.
+# Some libraries order rows or coordinates differently. Times exclude the reordering of inputs and results.
 
 #: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
@@ -192,7 +191,7 @@ def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 def dynibo(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo.
 
-    Jacobians of dynibo are column-major, with rows [angular; linear]. The joints are in breadth-first order.
+    dynibo stores a Jacobian column by column, with rows [angular; linear] and joints in breadth-first order.
     """
     import dynibo
 
@@ -330,11 +329,9 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
     yield Calls(label, names, lines, order=order, remark=remark)
 
 
-#: Maximum batch size for PyTorch Kinematics.
-#: For larger batches, the time per configuration grows.
+#: Maximum batch size for PyTorch Kinematics, because the time per configuration grows for larger batches.
 _MAX_BATCH = 20_000
-#: Tolerance for PyTorch Kinematics.
-#: PyTorch Kinematics reads a URDF's angles in single precision.
+#: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _SINGLE_TOLERANCE = 1e-6
 
 

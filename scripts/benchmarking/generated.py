@@ -1,13 +1,14 @@
 """Generate C code for one robot, one frame and one quantity.
 
-The benchmark compares this code's speed with urdfkin's kernels, which work for all robots. CasADi writes the
-textbook's equations as C code without loops and branches. The code contains the robot's constants, and omits
-products with 0 and 1. SIMD vectors of doubles compute several configurations together. `generated.c` contains
-the loop over the configurations. The measured time includes sine, cosine and the transposition of the arrays.
+The benchmark compares the speed of this code with the speed of urdfkin's kernels, which work for all robots.
+CasADi writes the textbook's equations as C code without loops and branches. The code contains the robot's
+constants, and omits products with 0 and 1. SIMD vectors of doubles compute several configurations together;
+`generated.c` contains the loop over the configurations. The measured time includes sine, cosine and the
+transposition of the arrays.
 
 The generated code does not check inputs. Infinite inputs, nan, and angles of 10^15 turns or more cause wrong
-results. On processors without fused multiply-adds, a million turns cause sine errors of 1e-9. The same
-applies to the cosine. Unlike urdfkin, the generated code does not correct the last digit of sine and cosine.
+results. On processors without fused multiply-adds, a million turns cause errors of 1e-9 in sine and cosine.
+Unlike urdfkin, the generated code does not correct the last digit of sine and cosine.
 """
 
 import ctypes
@@ -84,7 +85,7 @@ def generated_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
-    """Return a function of the batch size and the addresses of q, v, a, `out`."""
+    """Return a function of the batch size and of the addresses of q, v, a and `out`."""
     plan, folder = workload.plan, workload.folder
     is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {
@@ -126,8 +127,7 @@ def _generate_code(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # Replace doubles by SIMD vectors.
-    # Remove CasADi's tests for missing arguments.
+    # Replace doubles by SIMD vectors, and remove CasADi's tests for missing arguments.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

@@ -1,6 +1,6 @@
-"""Describe the machine; measure a batch's memory and the time of a first use.
+"""Describe the machine; measure the memory of a batch and the time of a first use in new processes.
 
-This module runs itself in new processes. A new process has loaded no kernel and no library.
+This module runs itself in a new process, which has loaded no kernel and no library yet.
 """
 
 import json
@@ -21,12 +21,11 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the times (ms) for a first result.
-#: The kernel cache is empty, or contains the kernels.
+#: Keys of the time (ms) for a first result, with an empty kernel cache and with stored kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Maps a method of `Robot` to its number of inputs.
-#: The first call of the method compiles a kernel.
-#: Inputs: 1: q. 2: q, v. 3: q, v, a.
+#: Maps a method to the number of its inputs: 1 (q), 2 (q and v) or 3 (q, v and a). The first call of the
+#: method compiles a kernel. A name with `prepared.` is a method of a prepared evaluator, any other name a
+#: method of `Robot`.
 USES = {
     "placement": 1,
     "velocity": 2,

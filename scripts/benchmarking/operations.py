@@ -1,8 +1,8 @@
 """Count the additions and multiplications that compute a result for one configuration.
 
 The module calls urdfkin's functions with objects that record each operation. A fused multiply-add counts as
-two operations. Manufacturers also count two operations for the peak performance. The negation -x does not
-count. A product with the constant 0 or 1 does not count.
+two operations, because manufacturers also count two for the peak performance of a processor. The negation -x
+does not count. A product with the constant 0 or 1 does not count.
 """
 
 from __future__ import annotations
@@ -24,11 +24,9 @@ from urdfkin.compiled.plan import (
 )
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: Operations for sine and cosine of one angle (`compiled.python_numbers`):
-#: 10: reduction of the angle to r.
-#: 8: z = r^2, 1 - z/2 and the rounding errors.
-#: 20: the two polynomials.
-#: 13: the combination of the values.
+#: Operations for sine and cosine of one angle (`compiled.python_numbers`). 10 operations reduce the angle to
+#: r, and 8 operations compute z = r^2, 1 - z/2 and their rounding errors. 20 operations evaluate the two
+#: polynomials, and 13 operations combine the values.
 _SINE_COSINE = 51
 
 
@@ -37,8 +35,8 @@ class Number:
     """A number that records an operation instead of a value."""
 
     constant: int | None = None  # 0 or 1; None for any other number
-    unused: bool = False  # placeholder: operations on a placeholder do not count
-    operands: tuple[Number, ...] = ()  # empty for an input or a constant
+    unused: bool = False  # True for a placeholder; operations with a placeholder do not count
+    operands: tuple[Number, ...] = ()  # both operands of the operation; empty for an input or a constant
 
     def __add__(self, other: Number) -> Number:
         if self.unused or other.unused:

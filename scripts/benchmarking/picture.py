@@ -1,4 +1,4 @@
-"""Plot all contenders' times, and urdfkin's time by joints and batch size."""
+"""Plot the times of all contenders, and urdfkin's time for several numbers of joints and batch sizes."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, figure_bytes, new_figure, style
 
-#: Maps a contender's prefix to colour, hatch and legend.
+#: Colour, hatch and legend for each prefix of a contender's name.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),
@@ -25,7 +25,7 @@ Entry = Mapping[str, Any]
 def draw(figures: Mapping[str, Any], path: Path) -> bytes:
     rows = figures["rows"]
     with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
-        figure = new_figure(11.0, 12.0)  # The longest contender's name fits.
+        figure = new_figure(11.0, 12.0)  # The longest name of a contender fits into this width.
         grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
         for row, quantity in enumerate(MARKS):
             bars = figure.add_subplot(grid[row, :])

@@ -154,12 +154,11 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# For a batch, kernel k executes the first k steps.
-# time(step k) = time(kernel k) - time(kernel k - 1)
-# For one configuration, `_calls` has seven lines of Python.
-# A step's time is a difference of line times.
+# For a batch, the benchmark measures kernels that have only the first k steps, for each k. The time of step k
+# is the time for k steps, minus the time for k - 1 steps. For one configuration, the benchmark measures seven
+# lines of Python (`_calls`). The time of a step follows from differences between the times of the lines.
 
-#: Maps a step of a batch to its instructions.
+#: Maps each step of a batch to the instructions of the compiled program that execute this step.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -170,7 +169,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield each step's time (ns per configuration), for each robot and quantity."""
+    """Yield the time of each step (ns per configuration), for each robot and quantity."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [
@@ -206,8 +205,8 @@ def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram,
         program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, buffered=buffered
     )
     core = getattr(kernels, f"{quantity}s")
-    # `kernel_args` contains addresses of the arrays in `owners`.
-    # The default argument keeps these arrays alive.
+    # The kernel arguments contain only addresses of the arrays in `owners`, so the default argument keeps
+    # these arrays alive.
     owners = program, memory, out, inputs
 
     def compute(_: object = owners) -> None:
@@ -258,7 +257,7 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # time of the loop alone
+        "q",  # This line calls no function, so the measured time is the time of the loop.
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # `compute` rejects a tuple as `out`.
         "empty(shape)",

@@ -17,9 +17,8 @@ Entry = Mapping[str, Any]
 _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: Sections for several numbers of joints, frames or configurations.
-#: A section has a title and a function.
-#: The function makes a table row from a measurement.
+#: Sections with measurements for several numbers of joints, frames or configurations. A section has a title,
+#: and a function that makes the table row of one measurement.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
@@ -117,8 +116,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
         yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # Rows of one quantity and contender are neighbours.
-            # Groups keep the order of their first rows.
+            # Sort the rows by quantity, then by contender. Groups keep the order of their first rows.
             keys = [(row["quantity"], row["label"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["label"])))

@@ -1,8 +1,8 @@
-"""Measure the run times of libraries, and compare the libraries' results.
+"""Measure the run time of each compared library, and check that all libraries compute the same numbers.
 
 Each round measures every library once, in a different order. Ratios are therefore reliable on a noisy
 machine, and absolute times are not. Before each timed run, the contender computes once without timing. The
-processor's cache then contains the contender's data. The threads of other contenders are then idle.
+processor's cache then contains the contender's data, and the threads of other contenders are idle.
 """
 
 import gc
@@ -17,18 +17,17 @@ import numpy as np
 from scripts.benchmarking.workload import Workload
 from urdfkin.model.tree import FloatArray
 
-#: Maximum difference from the reference (m, rad, m/s^2, rad/s^2).
-#: Rounding errors are much smaller than this difference.
+#: Maximum allowed difference from the reference contender (m, rad, m/s^2, rad/s^2). Rounding errors are much
+#: smaller than this difference.
 TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class TimedTask:
     label: str
-    n: int  # configurations per call of `compute`
+    n: int  # number of configurations that one call of `compute` computes
     compute: Callable[[], object]
-    #: Function that returns the results in urdfkin's conventions.
-    #: None: no comparison of results.
+    #: Function that returns the results in urdfkin's conventions; None: the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
     remark: str = ""
@@ -42,12 +41,12 @@ class Row:
     robot: str
     quantity: str
     numbers: int  # number of values in one result
-    size: int = 0  # joints, frames or configurations
+    size: int = 0  # number of joints, frames or configurations, in a section that varies this number
     label: str = ""
     n: int = 0  # number of configurations in a call
     median_ns: float = 0.0
     minimum_ns: float = 0.0
-    #: ratio = baseline's median / contender's median
+    #: Median time of the baseline, divided by the median time of the contender.
     ratio: float | None = None
     remark: str = ""
 
@@ -121,14 +120,13 @@ def measure_rows(
 
 @dataclass(frozen=True)
 class Calls:
-    """The lines of Python that call a library, directly in the timed loop."""
+    """The lines of Python that call a library; they are compiled into the body of the timed loop."""
 
     label: str
-    #: Variables of the lines. The variables `q`, `v`, `a` always exist.
+    #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.
     names: Mapping[str, Any]
     lines: tuple[str, ...]  # The value of the last line is the result.
-    #: Lines that write result k into `out[k]`.
-    #: None: `out[k]` is the result of `lines`.
+    #: Lines that write the result of configuration k into `out[k]`; None: the result of `lines` is written.
     store: tuple[str, ...] | None = None
     #: The library's coordinate i is urdfkin's coordinate `order[i]`.
     #: None: the same order.
@@ -136,9 +134,9 @@ class Calls:
     #: Shape of the library's result for one configuration.
     #: None: the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
-    #: Converts a batch's raw results to urdfkin's conventions.
+    #: Function that converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
-    #: Converts a call's result to the layout of `out[k]`.
+    #: Function that converts a call's result to the layout of `out[k]`.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 

@@ -1,4 +1,4 @@
-"""The inputs of all contenders: one robot, one frame and configurations."""
+"""A workload of the benchmark: one robot, one frame, and the inputs that all contenders use."""
 
 import contextlib
 import tempfile
@@ -15,7 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
-#: Most joints of talos do not move `gripper_left_base_link`.
+#: Most joints of the humanoid talos do not move `gripper_left_base_link`.
 ROBOT_FRAMES = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls.
 LOOP = 2_000
@@ -80,7 +80,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a copy without visuals, collisions and mimic rules.
 
     All links get the same inertia, because some libraries need inertias.
-    The name `world` is replaced, because some libraries add such a body.
+    The name `world` is replaced, because some libraries add a body of this name.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))

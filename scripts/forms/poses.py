@@ -2,12 +2,12 @@
 
     python scripts/forms/poses.py JOBS RESULTS
 
-The JSON file JOBS contains a list of jobs. A job has a format's name `form`, the table's Python code `text`,
-and a list `q` of configurations. The script computes a pose for each configuration. The JSON file RESULTS
-then contains a list of poses for each job.
+The JSON file JOBS contains a list of jobs. A job has the entries `form` (name of the format), `text` (Python
+code of the table) and `q` (list of configurations). The script computes a pose for each configuration. The
+JSON file RESULTS then contains a list of poses for each job.
 
-The interpreter needs the library that the code imports. The Robotics Toolbox may have its own environment, so
-the script does not import urdfkin.
+The interpreter needs the library that the code imports. The script does not import urdfkin, because the
+Robotics Toolbox may have its own environment.
 """
 
 import json

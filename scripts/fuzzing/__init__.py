@@ -25,5 +25,5 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    result: str  # short description; a pass is in `PASSED`
+    result: str  # short description; the test failed if it is not in `PASSED`
     details: str = ""

@@ -1,6 +1,6 @@
-"""Test one robot: check, load, compute all quantities, compare with Pinocchio.
+"""Test one robot: check it, load it, compute all quantities and compare them with Pinocchio.
 
-All calls use the same forward recursion, so their results must have equal bits.
+Results of different calls must have the same bits, because all calls use the same forward recursion.
 """
 
 import traceback
@@ -26,20 +26,18 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Codes of findings about huge numbers.
-#: The results of such robots may be inf or nan.
+#: Codes of findings about huge numbers, for which results may be inf or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
-#: Maximum number of frames with a second call for this frame only.
-#: The second call must return the same results.
+#: Maximum number of frames that are also computed alone. The results must equal the results of the call for
+#: several frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
-#: Standard deviation of a far base's coordinates, in metres.
+#: Standard deviation of each coordinate of the far base's position, in metres.
 FAR = 1e6
-#: Maps a quantity to its number of inputs.
-#: One call can compute these quantities for several frames.
-#: Inputs: 1: q. 2: q, v. 3: q, v, a.
+#: Quantities that one call can compute for several frames, each with its number of inputs: 1 (q), 2 (q and v)
+#: or 3 (q, v and a).
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -93,8 +91,7 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
         for computation, result in compute_all(robot, seed=0):
             if not np.isfinite(result).all():
                 return Outcome(too_large, computation)
-        # The certificate does not cover DH tables.
-        # An unverified table causes a warning.
+        # The certificate does not cover DH tables, but a table that is not verified causes a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
         compare_prepared(robot, seed=0)
@@ -218,7 +215,7 @@ def _placements_by_name(
     for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
             yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
-        except UnknownNameError:  # Without a joint x, `joint:x` is unknown.
+        except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
             if prefixed_names[i] in names:
                 raise
         except InputError:  # A link and a joint have the same name.

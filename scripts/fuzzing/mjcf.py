@@ -1,10 +1,10 @@
 """Make random MJCF files with free joints, equality constraints and default classes.
 
-In some files, MuJoCo aligns free bodies with their inertial frames (`alignfree`, `align`). Some files let
-MuJoCo fuse static bodies (`fusestatic`).
+In some files, MuJoCo aligns free bodies with their inertial frames (attributes `alignfree` and `align`), or
+fuses static bodies (attribute `fusestatic`).
 
-A file depends only on the seed, its family and its number. MuJoCo computes the poses of all bodies and sites,
-and checks the equality constraints. MuJoCo does not use urdfkin's MJCF reader.
+A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
+and checks the equality constraints, independently of urdfkin's MJCF reader.
 """
 
 import random
@@ -20,11 +20,11 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Maximum error of a placement, divided by `large`.
-#: The tolerance for constraints is 1000 times larger.
+#: Tolerance for placements, relative to the sizes of the joint coordinates. The tolerance for equality
+#: constraints is 1000 times larger.
 _TOLERANCE = 1e-12
 
-# MuJoCo's own handler writes a log into the current folder.
+# Without this handler, MuJoCo writes its warnings to a log in the current folder.
 mujoco.set_mju_user_warning(lambda said: None)
 
 
@@ -77,7 +77,7 @@ class _RandomModel:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        # The rotation of a box rotates the axes of inertia.
+        # The axes of inertia of a rotated box are not parallel to the body's axes.
         for _ in range(rng.randint(1, 2)):
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
@@ -181,7 +181,7 @@ def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | Non
                 )
         mujoco.mj_fwdPosition(model, data)
         large = 10.0 + float(np.abs(data.qpos).max(initial=0.0)) + float(np.abs(model.qpos0).max(initial=0.0))
-        # A hinge angle has a rounding error of about EPS * angle. The lever arm multiplies this error.
+        # A hinge angle has a rounding error of about EPS * angle, which the lever arm multiplies.
         sizes = np.abs(data.qpos) + np.abs(model.qpos0)
         angle = float(sizes[model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]].sum())
         tolerance = _TOLERANCE * large + EPS * angle * (10.0 + float(sizes.sum()))

@@ -1,7 +1,7 @@
-"""Make mutants of real URDFs; seed and number determine the bytes.
+"""Make mutants of real URDFs; the same seed and number give the same bytes on any machine.
 
-There are four families: bytes, tokens, attributes and structure. Structure means new parents, closed loops,
-swapped names, changed types and mimic rules.
+There are four families: bytes, tokens, attributes, and structure (new parents, closed loops, swapped names,
+changed types and mimic rules).
 """
 
 import contextlib
@@ -14,8 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size (bytes) of a file for mutations.
-#: Mutants of larger files are slow to test.
+#: Maximum size (bytes) of a mutated file, because mutants of larger files are slow to test.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -44,8 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: urdfkin rejects most mutants of the first three families.
-#: Half of all changes therefore belong to `_STRUCTURE`.
+#: Half of all changes are changes of structure, because urdfkin rejects most mutants of the other families.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
@@ -88,12 +86,12 @@ def _change_tokens(rng: random.Random, kind: str, data: bytes) -> bytes:
         odd = (b"\n", b"<!DOCTYPE robot>", b'<!DOCTYPE r [<!ENTITY a "b">]>', b"<!-- -->", b"text")
         return rng.choice(odd) + data
     pattern = {"odd_number": _NUMBER, "odd_blank": re.compile(rb" ")}.get(kind, _VALUE)
-    # A search for one match is faster than for all.
+    # The first match after a random position is searched, because a search for all matches is slower.
     starts = [rng.randrange(len(data) + 1) for _ in range(2)]
     first, second = (pattern.search(data, position) or pattern.search(data) for position in starts)
     if first is None or second is None:
         return data
-    group = pattern.groups  # 2: an attribute's value; 0: the whole match
+    group = pattern.groups  # Group 2 is an attribute's value, and group 0 is the whole match.
     if kind == "swap_values":
         if first.start() == second.start():
             return data
@@ -115,7 +113,7 @@ def _change_tree(rng: random.Random, kind: str, data: bytes) -> bytes:
         return data
     if root.tag != "robot":
         return data
-    # Without a suitable element, the tree stays unchanged.
+    # If the file has no element to which the change `kind` applies, the tree stays unchanged.
     with contextlib.suppress(IndexError):
         (_change_structure if kind in _STRUCTURE else _change_elements)(rng, kind, root)
     changed: bytes = ET.tostring(root, encoding="utf-8")

@@ -1,6 +1,6 @@
-"""Make random robots: trees with all kinds of joints and unusual content.
+"""Make random robots, which are trees with all kinds of joints and some unusual content.
 
-Most of these robots are legal. A rejected robot would not test the computations. A robot depends only on the
+Most of these robots are legal: a rejected robot would not test the computations. A robot depends only on the
 seed, its family and its number.
 """
 
@@ -12,12 +12,12 @@ from xml.sax.saxutils import quoteattr
 from scripts.fuzzing import Case
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: Kinds of unusual content, each also a family of robots.
-#: "everything" contains each kind with probability 0.4.
+#: Kinds of unusual content. Each kind is also a family of robots. A robot of the family "everything" has each
+#: kind with probability 0.4.
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
-#: Internal names of urdfkin and Pinocchio, and similar names.
+#: Names for random robots: internal names of urdfkin or Pinocchio, and similar names.
 INTERNAL_NAMES = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",
@@ -70,10 +70,7 @@ def usual_length(rng: random.Random) -> float:
 
 
 def odd_length(rng: random.Random) -> float:
-    """Return a length of random magnitude.
-
-    Lengths are below 1e301, so a sum of lengths does not overflow.
-    """
+    """Return a length of random magnitude, below 1e301 so that a sum of lengths does not overflow."""
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
     return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)
@@ -207,8 +204,8 @@ class _RandomRobot:
     def joint(self, i: int) -> str:
         """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Rounding errors are largest at the tip of long chains.
-        # Link i is therefore the most probable parent.
+        # Link i is the most probable parent, so about half of the random robots are chains. A chain
+        # accumulates the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",
@@ -243,7 +240,7 @@ class _RandomRobot:
 
     def limit(self, kind: str) -> str:
         rng = self.rng
-        # URDF 1.2 allows limits of planar, floating and fixed joints.
+        # In URDF 1.2, planar, floating and fixed joints may have limits.
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):
@@ -267,7 +264,7 @@ class _RandomRobot:
         rng = self.rng
         if "mimic" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
-        # Mimicked joints have lower numbers, which excludes cycles.
+        # A mimic joint mimics only a joint with a lower number, so there is no cycle.
         independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not independent_joints:
             return ""

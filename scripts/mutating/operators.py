@@ -1,4 +1,4 @@
-"""Make all mutants of a file; each changes one node of the syntax tree.
+"""Make all mutants of a file; each mutant changes one node of the file's syntax tree.
 
 Texts, types and compiled kernels are not mutated.
 """
@@ -53,7 +53,7 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Put the mutant's value into the tree for a `with` block; yield the old value."""
+        """Put the mutant's value into the tree for a `with` block, and yield the replaced value."""
         old = self.put(self.value)
         try:
             yield old

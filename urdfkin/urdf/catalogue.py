@@ -1,11 +1,11 @@
-"""Find robots by name, and find ROS packages without ROS.
+"""Find robots by name in the catalogue and in robot_descriptions, and find ROS packages without ROS.
 
-The catalogue has the robots of example-robot-data and urdfkin's own robots. The Python package
-robot_descriptions has more robots. At the first use, the package clones a robot's repository into a cache. A
-module of robot_descriptions is imported only if `DESCRIPTIONS` contains the module's name.
+The catalogue has the robots of example-robot-data and urdfkin's own robots. robot_descriptions is a Python
+package that clones the repository of a robot into a cache at the first use. urdfkin imports a module of
+robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`.
 
-The function `find_package` returns the first existing folder of a package `name`. The candidates are, in this
-order:
+The function `find_package` searches for the folder of a package `name`, and returns the first candidate that
+exists. The candidates are, in this order:
 
 | Folders F | Candidates |
 |---|---|
@@ -13,8 +13,7 @@ order:
 | in `AMENT_PREFIX_PATH` | `F/share/name` |
 | all parents of `referring_file`, the nearest first | F if it is the package, then `F/name` |
 
-A parent F is the package if F is called `name`. F is also the package if `F/package.xml` declares the package
-`name`.
+A parent F is the package if F is called `name`, or if `F/package.xml` declares the package `name`.
 """
 
 from __future__ import annotations
@@ -41,14 +40,13 @@ class CatalogueEntry:
     """A robot of the catalogue.
 
     Attributes:
-        relative_path: Path of the URDF, relative to the robots folder. The robots folder is in urdfkin or in
-            example-robot-data.
+        relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. If False, urdfkin ignores all
             mimic rules by default.
         mimic_problem: The reason why the mimic rules are invalid, or None.
-        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0. The
-            pose `ready` uses the middle of limits that exclude 0.
+        poses: Joint values (rad or m) by joint name, for each named pose. Other joints have the value 0. In
+            the pose `ready`, they have the middle of their limits if the limits exclude 0.
         is_bundled: Whether urdfkin contains the URDF. If False, example-robot-data contains the URDF.
     """
 
@@ -132,10 +130,7 @@ PACKAGE_SCHEMES = ("package://", "model://")
 
 
 def split_uri(uri: str) -> tuple[str, str] | None:
-    """Return package and path of a `package://` or `model://` address.
-
-    Return None for other text.
-    """
+    """Return package and path of a `package://` or `model://` address; None for other text."""
     for scheme in PACKAGE_SCHEMES:
         if uri.startswith(scheme):
             package, _, path = uri.removeprefix(scheme).partition("/")
@@ -204,10 +199,10 @@ class ResolvedDescription:
 
 
 def find_description(source: object) -> ResolvedDescription | None:
-    """Return the file of a robot in robot_descriptions.
+    """Return the file of a robot in robot_descriptions, or None for any other source.
 
-    `source` is the name of a description module, or the module itself. Return None for any other source. The
-    name of a catalogue robot or of an existing file also gives None.
+    `source` is the name of a description module, or the module itself. The name of a catalogue robot or of an
+    existing file gives None.
 
     | Error | Cause |
     |---|---|

@@ -1,12 +1,13 @@
-"""Confine the current process. A confined process only computes and reads allowed files.
+"""Confine the current process, so that it can only compute and read allowed files.
 
-The operating system limits the memory and CPU time of the process. Written files and new processes are also
-forbidden. Opened files, new processes, sockets and imports raise audit events in Python. An audit hook
-refuses all events except the allowed events. The hook and the limits remain until the process ends. A xacro
-file that controls the Python interpreter could circumvent the hook. The limits would still hold.
+The operating system limits the memory and CPU time of the process, and prevents the process from writing
+files and from starting other processes. Python raises an audit event for each opened file, new process,
+socket and import. An audit hook refuses all events except the allowed events. The hook and the limits remain
+until the process ends. A xacro file that controls the Python interpreter could circumvent the hook, but not
+the limits.
 
-This confinement is the second defence. The first defence is the module `expressions`. The module evaluates
-the expressions of a file without Python's `eval`.
+This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
+expressions of a file without Python's `eval`.
 
 On macOS, the memory is not limited.
 """
@@ -22,8 +23,8 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum memory of the process in bytes.
-#: Python and libraries need about a tenth of this memory.
+#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth of this
+#: memory.
 MAX_MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.
@@ -35,7 +36,7 @@ _HARMLESS_EVENTS = {
     "object.__getattr__",
     "sys._getframe",
 }
-#: Audit events that are allowed only for readable files.
+#: Audit events that are allowed only for files that the process may read.
 _READ_EVENTS = {"open", "os.listdir", "os.scandir"}
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
@@ -45,10 +46,10 @@ class AllowedPaths:
     """The files that a confined process may read.
 
     Attributes:
-        roots: Readable files, and folders with readable content. Hidden files and folders are excluded. A
-            symbolic link must lead to a path in `roots` or below.
-        package_folders: Folders with installed packages. A symbolic link in these folders may lead to any
-            package. `colcon build --symlink-install` writes such links.
+        roots: Readable files, and folders with readable content, except hidden files and folders.
+            The target of a symbolic link must also be in `roots` or in a folder of `roots`.
+        package_folders: Folders with installed packages. A symbolic link in these folders may point to a
+            package in any other folder. `colcon build --symlink-install` writes such links.
         manifests: The paths of package.xml in the folders above the xacro file. The search for packages reads
             these files.
     """
@@ -61,9 +62,9 @@ class AllowedPaths:
     def of_file(cls, path: Path, package_paths: list[str], arguments: list[str]) -> AllowedPaths:
         """Return the paths that urdfkin may read to load the robot file `path`.
 
-        `roots` contains the folder, ROS package and git repository of the file. `roots` also contains the
-        folders in `package_paths` and existing paths in `arguments`. The home folder and `/` do not count as
-        package, repository or argument.
+        `roots` contains the folder, the ROS package and the git repository of the file. `roots` also contains
+        the folders in `package_paths` and the existing paths in `arguments`. The home folder and `/` do not
+        count as package, repository or argument.
         """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for file_name in ("package.xml", ".git"):
@@ -92,7 +93,7 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or is below `root` and not hidden."""
+    """Return whether `path` is `root`, or is below `root` without a hidden folder or file below `root`."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -107,10 +108,7 @@ def _exists(path: Path) -> bool:
 
 
 def limit_process(seconds: int) -> None:
-    """Limit memory and CPU time of this process.
-
-    Forbid written files and new processes.
-    """
+    """Limit memory and CPU time of this process; forbid writing files and starting processes."""
     import resource
 
     bounds = {
@@ -130,9 +128,9 @@ def limit_process(seconds: int) -> None:
 
 
 def confine(is_allowed: Callable[[str], bool]) -> None:
-    """Permit only harmless audit events and reads of allowed files.
+    """Permit only harmless audit events and reads of allowed files, until this process ends.
 
-    Any other event raises RefusedError. The confinement remains until this process ends.
+    Any other event raises RefusedError.
     """
 
     def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:

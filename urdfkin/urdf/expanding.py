@@ -1,7 +1,8 @@
 """Expand a xacro file with xacrodoc, in the confined process.
 
 A xacro file can run Python code and read environment variables. Therefore, the module `expressions` evaluates
-the expressions of the file. The module `confinement` limits the readable files.
+the expressions of the file, and the module `confinement` limits the files that the process can read. The
+process has no environment variables.
 """
 
 from __future__ import annotations
@@ -22,21 +23,18 @@ from urdfkin.urdf.xacro import find_arguments
 #: Functions of xacro that would reveal types and attributes.
 _FORBIDDEN_SYMBOLS = ("type", "vars")
 
-#: An expression that xacro evaluates, and urdfkin refuses.
+#: A test expression, which xacro's own function evaluates, but urdfkin's function refuses.
 _TEST_EXPRESSION = "${(lambda: 1)()}"
 
 _TOO_MUCH_MEMORY = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
-    """Read a request from standard input, and write the result.
-
-    The result is the last line of standard output.
-    """
+    """Read a request from standard input, and write the result as the last line of standard output."""
     request = json.load(sys.stdin)
     limit_process(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # Included paths may be relative to the file's folder.
+    os.chdir(Path(request["path"]).parent)  # Paths in includes may be relative to the folder of the file.
     allowed_paths = AllowedPaths(**request["allowed_paths"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], allowed_paths)

@@ -1,10 +1,11 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
 The package xacro passes expressions to `eval`. Before that, xacro searches the expression for forbidden
-names. The body of a lambda is not searched. Therefore, a lambda can read any attribute, and run any program.
+names, but does not search the body of a lambda. A lambda can therefore read any attribute, and run any
+program.
 
-This module interprets the syntax tree of an expression. Allowed are values, operators, xacro's functions and
-the methods in `_METHODS`.
+This module interprets the syntax tree of an expression. An expression may call only xacro's functions and the
+methods in `_METHODS`.
 """
 
 from __future__ import annotations
@@ -62,11 +63,8 @@ class RefusedError(Exception):
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
     """Return the value of an expression that calls only `functions` and `_METHODS`.
 
-    | Error | Cause |
-    |---|---|
-    | RefusedError | forbidden content |
-    | NameError | an unknown name |
-    | SyntaxError | text that is not an expression |
+    Raise RefusedError for forbidden content, NameError for an unknown name, and SyntaxError for text that is
+    not an expression.
     """
     tree = ast.parse(expression.strip(), mode="eval")
     return _Evaluation(names, functions).value(tree.body)
@@ -172,10 +170,7 @@ class _Evaluation:
     GeneratorExp = ListComp
 
     def _iterations(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
-        """Run nested loops.
-
-        For each iteration, yield an `_Evaluation` that knows the loop variables.
-        """
+        """Run nested loops; for each iteration, yield an `_Evaluation` that knows the loop variables."""
         if not loops:
             yield self
             return

@@ -1,7 +1,6 @@
-"""Findings: problems in a file.
+"""Findings: problems in a file, each with a code, a position, the wrong text and a remedy.
 
-A finding has a code, a position, the wrong text and a remedy. Line and column numbers do not count a byte
-order mark.
+Line and column numbers do not count a byte order mark.
 
 A comment in a URDF can silence warnings and notes, but not errors. The comment names the codes of the
 findings and gives a reason:
@@ -33,7 +32,7 @@ from urdfkin.errors.escape import escape_unprintable, log_line
 from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
-#: Maximum number of quoted characters in a message.
+#: Maximum number of characters of a file that a message quotes.
 MAX_QUOTE_LENGTH = 60
 
 
@@ -45,8 +44,8 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
     return '"' + shorten(text, limit).replace('"', '\\"') + '"'
 
 
-#: A line of more than `MAX_EXCERPT_LENGTH` characters is cut.
-#: At most `MAX_EXCERPT_LEAD` characters then precede the underlined text.
+#: A line of more than `MAX_EXCERPT_LENGTH` characters is cut. A cut line has at most `MAX_EXCERPT_LEAD`
+#: characters before the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB_SPACES = "    "
@@ -63,9 +62,7 @@ class ExcerptFormatter:
         self.number, self.text = 0, ""
 
     def format(self, finding: Finding) -> str | None:
-        """Return the line of a finding, with carets below the wrong text.
-
-        Return None if the finding marks no text.
+        """Return the line of a finding, with carets below the wrong text; None if the finding marks no text.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -97,8 +94,7 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Upper bound (rad) on the rounding error of an angle.
-#: The bound holds for angles up to one revolution.
+#: Upper bound (rad) on the rounding error of an angle of at most one revolution.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -424,10 +420,7 @@ class CommentIndex:
             self._comment_by_key.setdefault((*place, code), ignore)
 
     def find_reason(self, code: str, line: int, element: Element | None) -> str | None:
-        """Return the reason of the nearest comment that silences a finding.
-
-        Mark the code as used.
-        """
+        """Return the reason of the nearest comment that silences a finding, and mark the code as used."""
         places = [("line", line)]
         while element is not None:
             places.append(("element", id(element)))
@@ -439,24 +432,21 @@ class CommentIndex:
         return None
 
 
-#: Maximum number of misspelt names with suggestions in a file.
+#: Maximum number of misspelt names in a file that get suggestions.
 MAX_NAME_SEARCHES = 20
-#: Maximum number of names in one search for similar names.
-#: Maximum number of compared character pairs in one search.
+#: Maximum number of names, and of compared pairs of characters, in one search for similar names.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: `fold` combines warnings or notes of one code.
-#: `MIN_FOLDED` is the minimum number of findings.
-#: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: Codes URDF7xx are about inertials, shapes and materials.
-#: Kinematics does not use these elements.
+#: With `fold`, one finding represents `MIN_FOLDED` or more warnings or notes with one code. For the codes
+#: URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`. These codes are about inertials, shapes and materials, which
+#: kinematics does not use.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: `fold` combines the errors of one code above this number.
+#: With `fold`, the maximum number of errors with the same code that are reported separately.
 MAX_ERRORS_PER_CODE = 100
 
-#: Maximum number of complete findings with one code and severity.
-#: For further findings, only the line numbers are stored.
+#: Maximum number of findings with one code and severity that are stored completely. For further findings,
+#: only the line numbers are stored.
 MAX_COMPLETE_FINDINGS = 10_000
 
 
@@ -485,8 +475,7 @@ class Reporter:
     #: Cache of `_spans` for one element.
     _cached_element: Element | None = None
     _cached_spans: dict[str, _AttributeSpan] = field(default_factory=dict)
-    #: Elements of findings that precede the call of `silence`.
-    #: The keys are the ids of the findings.
+    #: Elements of the findings that are added before the call of `silence`, by the id of the finding.
     _elements_before_silence: dict[int, Element] = field(default_factory=dict)
 
     def add(
@@ -506,9 +495,9 @@ class Reporter:
     ) -> None:
         """Add a finding about an element, or about the line and column `position`.
 
-        The finding names `element` if `names_element` is True. Otherwise, the finding names the child of
-        `<robot>` that contains `element`. The finding with the greatest `weight` represents combined warnings
-        or notes.
+        The finding names `element` if `names_element` is True, otherwise the child of `<robot>` that contains
+        `element`. If several warnings or notes are combined into one finding, the finding with the greatest
+        `weight` represents all of them.
         """
         severity = rule.severity if severity is None else severity
         reason = None
@@ -543,10 +532,7 @@ class Reporter:
             self.silenced_findings.append((finding, reason))
 
     def silence(self, comment_index: CommentIndex) -> None:
-        """Silence the warnings and notes that the file's comments name.
-
-        Findings added after this call are also silenced.
-        """
+        """Silence all warnings and notes that the file's comments name, also those added after this call."""
         self.comment_index = comment_index
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
@@ -580,7 +566,8 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings, sorted by line; omit findings for which `is_reported` returns False.
 
-        Call `is_reported` once for each complete finding, in file order. The function may count findings.
+        Call `is_reported` once for each complete finding, in file order, because the function may count
+        findings.
         """
         pairs = [pair for group in self._groups.values() for pair in group.weighted_findings]
         if is_reported is not None:
@@ -597,9 +584,9 @@ class Reporter:
 
     @property
     def has_replaced_characters(self) -> bool:
-        """Whether an attribute value may contain a tab, line end or reference.
+        """Whether an attribute value may contain a tab, a line end or a reference such as `&amp;`.
 
-        XML parsers replace these characters. An example of a reference is `&amp;`.
+        XML parsers replace these characters.
         """
         if self._replaced_characters is None:
             self._replaced_characters = _REPLACED_CHARACTER.search(self.data) is not None
@@ -654,10 +641,7 @@ class Reporter:
 
 @dataclass(frozen=True, slots=True)
 class _AttributeSpan:
-    """Line, column (in characters) and byte indices of an attribute.
-
-    The indices `value` exclude quotation marks.
-    """
+    """Line, column (in characters) and byte indices of an attribute; `value` excludes quotation marks."""
 
     line: int
     column: int
@@ -665,9 +649,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Matches an attribute value up to the first replaced character.
-#: XML parsers replace tabs, line ends and references.
-#: Possessive quantifiers keep the matching time linear.
+#: Matches an attribute value up to its first tab, line end or reference such as `&amp;`. Possessive
+#: quantifiers keep the matching time linear.
 _REPLACED_CHARACTER = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")
@@ -687,7 +670,7 @@ def _find_attribute_spans(data: bytes, element: Element) -> Iterator[tuple[str, 
 
 
 def start_of_blanks(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the first index of the white space before the index `start`."""
+    """Return the first index of the white space that ends before the index `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start

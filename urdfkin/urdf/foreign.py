@@ -2,8 +2,9 @@
 
 Objects of ElementTree, lxml and yourdfpy become URDF text. A Model of Pinocchio becomes a kinematic tree.
 
-The module names of an object's class and base classes identify the library. The attributes `tag`, `attrib`
-and `iter` identify an XML element. Therefore, urdfkin recognizes an object without an import of the library.
+urdfkin recognizes an object by the module names of its class and base classes. An XML element is recognized
+by its attributes `tag`, `attrib` and `iter`. Therefore, urdfkin does not import a library to recognize its
+objects.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 #: Maximum number of joint names in a finding.
 _MAX_NAMES = 5
 
-#: Placeholder for the XML element in records without a file.
+#: Placeholder for the XML element in records that do not come from a file.
 _NO_ELEMENT = Element("", {}, None, 0, 0, 0)
 
 
@@ -51,9 +52,9 @@ class XmlTree(Protocol):
 
 
 def convert_to_urdf(source: Any) -> tuple[str, str] | None:
-    """Return the URDF text of an object, and a name for messages.
+    """Return the URDF text of an object and a name for messages; None for an object of another library.
 
-    Return None for an object of another library. Raise InputError if the object cannot be written.
+    Raise InputError if the object cannot be written.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"
@@ -64,9 +65,9 @@ def convert_to_urdf(source: Any) -> tuple[str, str] | None:
 
 
 def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a note about yourdfpy joints that have an origin without rotation.
+    """Return a note about the joints of a yourdfpy robot that have an origin without rotation.
 
-    The package yourdfpy (0.0.60) ignores quat_xyzw. Such a joint may have lost the rotation in the file.
+    yourdfpy (0.0.60) ignores quat_xyzw, so such a joint may have lost the rotation in the file.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -129,8 +130,7 @@ def _serialize(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                # The copy omits comments and processing instructions.
-                # In ElementTree, the tag of a comment is a function.
+                # The copy omits comments and processing instructions, because their tags are functions.
                 if isinstance(child.tag, str):
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
@@ -138,9 +138,8 @@ def _serialize(root: Any) -> str:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-#: Pinocchio's joint classes with the axis x, y or z.
-#: R is a revolute joint. P is a prismatic joint.
-#: RUB is a revolute joint without limits.
+#: Names of Pinocchio's joint classes with the axis x, y or z. R is a revolute joint, and P is a prismatic
+#: joint. RUB is a revolute joint without limits.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KIND_BY_CLASS = {
     "R": JointKind.REVOLUTE,
@@ -152,8 +151,7 @@ _KIND_BY_CLASS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: Larger limits are treated as infinite.
-#: Pinocchio stores a missing limit as the largest double.
+#: Larger limits are treated as infinite, because Pinocchio stores a missing limit as the largest double.
 _INFINITE_LIMIT = 1e300
 
 
@@ -162,8 +160,8 @@ class ConvertedModel:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: Index of the Pinocchio joint with the link's frame, by link name.
-        frames: Index of the Pinocchio frame, by link name. Links in `joints` have no entry.
+        joints: Index of the Pinocchio joint that has the same frame, by link name.
+        frames: Index of the Pinocchio frame, by link name, for the links that are not in `joints`.
     """
 
     tree: KinematicTree
@@ -180,7 +178,7 @@ def convert_pinocchio_model(source: Any) -> ConvertedModel:
     """Convert a `Model` or `RobotWrapper`.
 
     A revolute joint without finite limits becomes continuous. `replace_missing_limits`
-    replaces each missing limit of a prismatic joint. Raise InputError for a mimic joint, or a joint
+    replaces each missing limit of a prismatic joint. Raise InputError for a mimic joint, and for a joint
     type that URDF lacks.
     """
     model = getattr(source, "model", source)
@@ -199,23 +197,23 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: Name of the moved link, by the joint index.
+        #: Name of the link that a joint moves, by the index of the joint.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: Name of the link, by the frame index.
+        #: Name of the link that represents a frame, by the index of the frame.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _find_bodies_at_joint_frames(self) -> Iterator[tuple[int, int]]:
-        """Yield the indices (joint, body) of bodies at the joint frame.
+        """Yield (joint, body) as indices, for each body that has the same frame as its joint.
 
-        The pairs are in reverse order. Therefore, `dict` keeps the first body of each joint.
+        The pairs are in reverse order, so that `dict` keeps the first body of each joint.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
 
     def convert(self) -> ConvertedModel:
-        # In Pinocchio, a parent frame precedes its child frames.
+        # In Pinocchio, the index of a parent frame is lower than the indices of its child frames.
         for i in range(len(self.frames)):
             self._convert_frame(i)
         frames = zip(self.frames, self.kinds, strict=True)
@@ -229,9 +227,9 @@ class _ModelReader:
         return ConvertedModel(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return a frame's parent link, and the frame's pose in this link.
+        """Return the parent link of a frame, and the pose of the frame relative to this link.
 
-        T is the frame's pose in the frame of `joint`.
+        T is the pose of the frame relative to the frame of `joint`.
         """
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
@@ -281,8 +279,8 @@ class _ModelReader:
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if class_name.endswith("Unaligned"):
-            # Some joint classes of Pinocchio 4.1 lack the attribute `axis`.
-            # Therefore, the motion subspace S = [linear; angular] is read.
+            # Some joint classes of Pinocchio 4.1 lack the attribute `axis`, so the axis is read from the
+            # joint's motion subspace S, a vector [linear; angular].
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

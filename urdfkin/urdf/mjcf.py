@@ -1,20 +1,18 @@
 """Convert an MJCF file to a kinematic tree.
 
-MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model.
+MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
-Each body becomes a link with the body's frame. Each site with a name also becomes a link. A fixed joint
-connects this link with the link of the site's body.
+- Each body becomes a link with the body's frame. Each site with a name also becomes a link; a fixed joint
+  connects this link with the link of the site's body.
+- MuJoCo applies the joints of a body in sequence. Joint k has the anchor p_k and the motion J_k. Joint k
+  changes the pose F of the body to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body
+  with several joints becomes a chain of joints and links. The last link of the chain is the body.
+- A joint has the same value in urdfkin's q and in MuJoCo's qpos, because the joint origin includes MuJoCo's
+  reference value (`ref`). Only quaternions differ: MuJoCo stores the scalar part first.
 
-MuJoCo applies the joints of a body in sequence. Joint k has the anchor p_k and the motion J_k. Joint k
-changes the body pose F to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body with several
-joints becomes a chain of joints and links. The last link of the chain is the body.
+`Mjcf.remarks` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
-The joint origin includes MuJoCo's reference value (`ref`). Therefore, a joint has the same value in q and in
-MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
-
-`Mjcf.remarks` names the parts that a tree cannot represent, for example tendons.
-
-MuJoCo can align the frame of a free body with the inertial frame. The options are `align` and `alignfree`.
+MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
 The inertial frame depends on the shapes. With these options, MuJoCo therefore needs the meshes.
 """
 
@@ -47,8 +45,7 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import expand_home, read_start
 from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
-#: Replacement (m) for a missing limit of a prismatic joint.
-#: URDF requires limits for prismatic joints.
+#: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
 FALLBACK_PRISMATIC_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
@@ -58,11 +55,11 @@ _SEARCHED_BYTES = 65_536
 
 @dataclass(frozen=True, slots=True)
 class MjcfRemark:
-    """A part that the tree omits or changes, or a probable mistake.
+    """A part of the file that the tree omits or changes, or a probable mistake in the file.
 
     Attributes:
-        where: Tag and name of the element, or the tag alone. None is the whole file.
-        moves: Whether the reported part affects the motion of the links.
+        where: The tag and the name of the element, or the tag alone; None for the whole file.
+        moves: Whether the reported part of the file affects the motion of the links.
         remedy: None, unless the file probably contains a mistake.
     """
 
@@ -80,12 +77,12 @@ class Mjcf:
         model: MuJoCo's compiled model, in which all bodies remain separate.
         fused_model: The model with fused static bodies. None if `with_shapes` is False or the file does not
             set `fusestatic`.
-        frames: For each link, "body" or "site", and the index in `model`.
+        frames: For each link, the word "body" or "site", and the index of this body or site in `model`.
         qpos_index: Index in MuJoCo's qpos of each moving joint, including mimic joints.
-        mimic_equalities: Name of the mimic joint, by the index of the equality.
-        other_equalities: Indices of active joint equalities that are not mimic rules.
+        mimic_equalities: Name of the mimic joint, by the index of the equality with the mimic rule.
+        other_equalities: Indices of the active joint equalities that are not mimic rules of the tree.
         with_shapes: Whether `model` contains the shapes and inertias of the file.
-        aligns_free_bodies: Whether MuJoCo aligns a free body's frame with the inertial frame.
+        aligns_free_bodies: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
         joint_names: Names of all joints, in the order of the file.
     """
 
@@ -102,10 +99,7 @@ class Mjcf:
     joint_names: tuple[str, ...]
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's qpos (n, `model.nq`) for urdfkin's q (n, nq).
-
-        The qpos contains the values of mimic joints.
-        """
+        """Return MuJoCo's qpos (n, `model.nq`), with the values of mimic joints, for urdfkin's q (n, nq)."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.qpos_index:
@@ -122,8 +116,8 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's placements (n, frames, 4, 4) of `frames` for q (n, nq).
 
-        If `fused_model` is None, `model` is used for all frames. Otherwise, `model` is used only for the
-        frames that `fused_model` lacks.
+        If `fused_model` is not None, it computes the frames that it contains, and `model` computes the other
+        frames.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -144,10 +138,9 @@ class Mjcf:
         return (kind, index) if index >= 0 else None
 
     def origin_distance_bounds(self, q: FloatArray) -> FloatArray:
-        """Return upper bounds (n, frames), m, on the distances from the world origin.
+        """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
-        A chain of translations leads from the world to a frame. The bound is the sum of the translation
-        lengths.
+        The bound is the sum of the lengths of all translations from the world to the frame.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -163,10 +156,9 @@ class Mjcf:
         return self._make_frame_values(at_body, norm(m.site_pos))
 
     def hinge_angle_sums(self, q: FloatArray) -> FloatArray:
-        """Return, for each frame, the sum (n, frames) of |q| + |ref| (rad).
+        """Return the sum (n, frames) of |q| + |ref| (rad) over the hinges between the world and each frame.
 
-        The sum includes the hinges between the world and the frame. A hinge is omitted if its reference value
-        `ref` is zero.
+        A hinge is omitted if its reference value `ref` is zero.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -186,7 +178,7 @@ class Mjcf:
     def _make_frame_values(self, body_values: FloatArray, site_values: FloatArray) -> FloatArray:
         """Return values (n, frames) from `body_values` (n, bodies) and `site_values` (sites,).
 
-        A site's value is its own value plus its body's value.
+        The value of a site is the sum of the site's own value and the value of its body.
         """
         columns = [
             body_values[:, i]
@@ -212,13 +204,12 @@ class Mjcf:
         return out
 
     def rule_scales(self, q: FloatArray) -> FloatArray:
-        """Return a scale for each equality, shape (n, equalities).
+        """Return a scale for each equality, shape (n, equalities); 0 if the equality is not a mimic rule.
 
-        The scale is 0 if the equality is not a mimic rule. A mimic rule's rounding error is at most
-        `MJCF_MIMIC_ROUNDINGS` * `EPS` * scale.
+        The rounding error of a mimic rule is at most `MJCF_MIMIC_ROUNDINGS` * `EPS` * scale.
 
-        Joint y follows y = y0 + c0 + c1 (x - x0). The scale of this rule is (k + 1) s(y). The chain from y to
-        an independent joint has k rules. The size s of a joint is:
+        A joint y with the rule y = y0 + c0 + c1 (x - x0) has the scale (k + 1) s(y). Here k is the number of
+        rules in the chain from y to an independent joint. The size s of a joint is:
 
         - for an independent joint: `s(x) = |x|`
         - for a mimic joint: `s(y) = |y0| + |c0| + |c1| (s(x) + |x0|)`
@@ -258,10 +249,9 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
-    """Return whether the root element of a source is <mujoco>.
+    """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>.
 
-    A source is a text, bytes, or a .xml or .mjcf file. The root element of a file must be in the first 65,536
-    bytes.
+    The root element of a file must be in the first 65,536 bytes.
     """
     if isinstance(source, bytes):
         return _ROOT_ELEMENT.match(source.decode("utf-8-sig", "replace")) is not None
@@ -278,9 +268,9 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
 def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    If `with_shapes` is False, shapes and inertias are removed first. MuJoCo then needs no mesh files. `name`
-    is the name of the source in messages. Raise InputError if MuJoCo is not installed or refuses the file.
-    Raise InputError also if the tree cannot represent a joint.
+    If `with_shapes` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files.
+    `name` is the name of the source in messages. Raise InputError if MuJoCo is not installed or refuses the
+    file, or if the tree cannot represent a joint.
     """
     mujoco = import_mujoco()
     fused_model = None
@@ -298,7 +288,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
             fused_model = compile_spec(_load_spec(mujoco, source))
         spec.compiler.fusestatic = False
         notes = list(_find_omissions(mujoco, spec))
-        # Removing constraints changes indices. Therefore, the names are read first.
+        # Removing constraints changes the indices of the remaining constraints, so the names are read first.
         equalities = [
             one.name or str(i)
             for i, one in enumerate(spec.equalities)
@@ -319,7 +309,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
     notes += [_make_alignment_remark(body.name, with_shapes=with_shapes) for body in aligned]
-    # Large limits in radians are plausible: hinges can turn repeatedly.
+    # Limits in radians are not checked, because large limits are plausible: some hinges turn several times.
     notes += _check_angle_unit(mujoco, model) if spec.compiler.degree else ()
     return Mjcf(
         tree, model, fused_model, reader.frames, reader.qpos_index, reader.mimic_equalities,
@@ -373,7 +363,7 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-#: Singular of each attribute of `MjSpec`, for messages.
+#: Elements that urdfkin does not use: maps an attribute of `MjSpec` to its singular for messages.
 _UNUSED_ELEMENTS = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
@@ -423,10 +413,7 @@ def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
 
 
 def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
-    """Remove elements that kinematics does not need.
-
-    MuJoCo then reads no mesh files.
-    """
+    """Remove elements that kinematics does not need, so that MuJoCo reads no mesh files."""
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for one in list(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
@@ -437,8 +424,7 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # `align` would use the inertial frame.
-        # The loop below replaces all inertias by placeholders.
+        # `align` would use the inertial frame, but the loop below replaces all inertias by placeholders.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -536,9 +522,9 @@ class _MjcfReader:
             self._add_fixed_joint(T, here, link)
 
     def _make_joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Convert MuJoCo's joint `j`. Also return the body pose in the joint frame.
+        """Convert MuJoCo's joint `j`; return the joint and the pose of its body in the joint frame.
 
-        T is the pose of the joint frame in the parent link. T holds for the joint value `ref`.
+        T is the pose of the joint frame in the parent link when the joint has its reference value `ref`.
         """
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
@@ -608,9 +594,9 @@ class _MjcfReader:
             yield name, resolve_rule(rules, name)
 
     def _read_rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the mimic joint y and its rule, or None.
+        """Return the mimic joint y and the mimic rule of equality `i`, or None.
 
-        Equality `i` must be y - y0 = c0 + c1 (x - x0). The reference values are x0 and y0.
+        The equality must have the form y - y0 = c0 + c1 (x - x0). Here x0 and y0 are reference values.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
@@ -639,10 +625,7 @@ def replace_missing_limits(lower: float, upper: float) -> tuple[float, float]:
 
 
 def make_unique(name: str, used_names: set[str]) -> str:
-    """Append underscores to a name until the name is unique.
-
-    Add the name to `used_names`.
-    """
+    """Append underscores to a name until the name is unique, and add the result to `used_names`."""
     while name in used_names:
         name += "_"
     used_names.add(name)

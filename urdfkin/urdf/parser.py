@@ -1,12 +1,11 @@
-"""Parse a URDF into XML elements, then into link and joint records.
+"""Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-The XML parser is expat. The parser reports the position of every start tag. Deep nesting needs no recursion.
-Namespace prefixes are kept. No other file is opened.
+The XML parser is expat. expat reports the position of every start tag, and parses deep nesting without
+recursion. expat keeps namespace prefixes, and opens no file. If a document type declaration has brackets or
+refers to an external file, parsing stops with an error. Therefore, only the entities of XML itself are
+expanded, for example `&amp;`.
 
-Parsing stops at a document type declaration with brackets or an external file. Therefore, only the entities
-of XML itself are expanded, for example `&amp;`.
-
-A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing. Every problem is a
+A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
 finding.
 """
 
@@ -59,9 +58,8 @@ UNUSED_DECLARED_ENCODING = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
-#: First bytes of XML files in UTF-32 and UTF-16.
-#: The little-endian mark of UTF-16 is a prefix of UTF-32's.
-#: Therefore, UTF-32 comes first.
+#: First bytes of XML files in UTF-32 and UTF-16. UTF-32 comes first, because its byte order mark begins with
+#: the byte order mark of UTF-16.
 _WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -71,7 +69,7 @@ _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: Encodings with the same bytes as UTF-8 for ASCII characters.
+#: Names of encodings in which ASCII characters have the same bytes as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
@@ -145,7 +143,7 @@ def _check_declaration(report: Reporter, text: bytes, declared: str | None) -> b
 
 
 def _find_codec(name: str) -> str | None:
-    """Return Python's name of an encoding, without hyphens except in `utf-8`."""
+    """Return Python's name of an encoding in lower case, without hyphens except in `utf-8`."""
     try:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
     except LookupError:
@@ -153,10 +151,7 @@ def _find_codec(name: str) -> str | None:
 
 
 def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
-    """Return the line and the column of a byte. Both numbers start at 1.
-
-    The column is a number of characters.
-    """
+    """Return the line and the column (in characters) of a byte; both start at 1."""
     lines = NEWLINE.split(data[: max(offset, 0)])
     return len(lines), len(lines[-1].decode("utf-8", "replace")) + 1
 
@@ -182,7 +177,7 @@ LIBXML2_DEPTH = 256
 #: Maximum number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
 
-#: An element with this many stored characters ignores further text.
+#: Number of stored characters after which the rest of an element's text is ignored.
 _MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
 #: Attributes that name a link or joint.
@@ -190,13 +185,13 @@ _NAME_ATTRIBUTES = frozenset({"name", "link", "joint"})
 
 
 class _StopError(Exception):
-    """An error that stops the parser."""
+    """An error after which the parser does not interpret the rest of the file."""
 
 
 def read_document(report: Reporter) -> Element | None:
-    """Parse the file of `report`. Return the root element; None after an error.
+    """Parse the file of `report` and return its root element; None after an error.
 
-    Remove the byte order mark from `report.data` if the file is UTF-8.
+    If the file is UTF-8, `report.data` becomes the text without a byte order mark.
     """
     data, max_bytes = report.data, report.limits.bytes
     if len(data) > max_bytes:
@@ -231,7 +226,7 @@ def read_document(report: Reporter) -> Element | None:
 
 
 class _Builder:
-    """Build the element tree from the events of expat. Check the limits."""
+    """Build the tree of elements from the events of expat, and check the limits."""
 
     def __init__(self, report: Reporter) -> None:
         self.report, self.limits = report, report.limits
@@ -257,7 +252,7 @@ class _Builder:
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
             self.parser.Parse(whole[start:fed], False)
-            # `CurrentByteIndex` is the start of an incomplete tag or comment.
+            # If a tag or comment is incomplete, `CurrentByteIndex` is the position of its first byte.
             if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
                 found = f"more than {self.limits.markup} bytes without an end"
                 self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
@@ -449,10 +444,7 @@ class NumberReader:
     effect: str = ""
 
     def read_scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """Return a number. A missing attribute has the value `default`.
-
-        Return None for an invalid number.
-        """
+        """Return a number; `default` if the attribute is missing, None if the number is invalid."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -511,10 +503,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, max_length: int) -> bool:
-        """Report a number that is too long.
-
-        The conversion of a long text takes quadratic time.
-        """
+        """Report a number that is too long, because the conversion of a long text takes quadratic time."""
         if len(written) <= max_length:
             return False
         found = f"{quote(written, 30)} of {len(written)} characters, more than {max_length}"
@@ -526,10 +515,9 @@ class NumberReader:
         return True
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
-        """Report tabs and line ends between or after numbers.
+        """Report tabs and line ends between or after numbers, because urdfdom refuses these characters.
 
-        A tab or line end makes urdfdom refuse the file. The raw text is read, because expat replaces tabs and
-        line ends.
+        The raw text is read, because expat replaces tabs and line ends.
         """
         raw_value = self.report.raw_value(element, attribute)
         if raw_value is None or self._is_too_long(
@@ -562,7 +550,8 @@ class NumberReader:
 #: Tags that messages about invalid numbers omit.
 _TAGS_OMITTED_IN_MESSAGES = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
+#: Leading zeros of a character reference. The zeros are removed, because `html.unescape` fails for thousands
+#: of zeros.
 _LEADING_ZEROS_OF_REFERENCE = re.compile(r"(&#[xX]?)0+")
 
 #: Patterns of invalid numbers, with remedies. The first matching pattern determines the remedy.
@@ -609,7 +598,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST_VERSION = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: A length in this range has a finite, nonzero square.
+#: The square of a length between these limits neither underflows nor overflows.
 MIN_VECTOR_LENGTH, MAX_VECTOR_LENGTH = 1e-150, 1e150
 
 
@@ -685,10 +674,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def read_name(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint.
-
-    Report a missing name, and return an empty string.
-    """
+    """Return the name of a link or joint; report a missing name and return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -724,7 +710,7 @@ class JointReader:
     ) -> str | None:
         """Return a required attribute; report a missing or empty attribute and return None.
 
-        If `number` is True, `NumberReader` reports the empty attribute instead.
+        If `number` is True, an empty attribute is not reported, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -805,7 +791,8 @@ class JointReader:
             return  # Rule URDF212 reports text between tags.
         message = "some readers read <axis> without xyz as 1 0 0; urdfdom reads 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
-        # A planar joint ignores its axis: the plane is XY.
+        # For a planar joint, the missing axis is only a warning, because the joint ignores its axis and moves
+        # in the XY plane of its frame.
         severity = Severity.WARNING if joint.kind == "planar" else None
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
@@ -838,10 +825,7 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, mimicked_joint, multiplier, offset)
 
     def _check_nonkinematic_elements(self, joint: JointRecord) -> None:
-        """Check elements without effect on kinematics.
-
-        An invalid element makes urdfdom refuse the file.
-        """
+        """Check elements that kinematics does not use; urdfdom refuses a file if one of them is invalid."""
         dynamics, safety = (joint.element.find(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
             self.read_required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
@@ -867,7 +851,7 @@ _UNUSED_NUMBERS = {
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     """Return the name in `known` that is most similar to `word`, or None.
 
-    If no name is similar, return a name that has the same letters.
+    If no name is similar, the result is a name with the same letters in another order.
     """
     # The cache must not store a name of several megabytes.
     return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
@@ -883,5 +867,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: Longer words resemble no tag or attribute of URDF.
+#: Longer words are not similar to any tag or attribute of URDF.
 _MAX_WORD_LENGTH = 32

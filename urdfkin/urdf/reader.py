@@ -40,7 +40,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with the names of its parent link and child link.
 
-    Raise InputError for a cycle of mimic joints, or an axis without direction. Raise UnknownNameError if a
+    Raise InputError if mimic joints form a cycle, or if an axis has no direction. Raise UnknownNameError if a
     mimicked joint does not exist.
     """
     rules = _mimic_rules(joints) if mimic else {}
@@ -60,7 +60,7 @@ def _make_joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
-    # The function `rotation_from_rpy` would check the numbers again.
+    # `rotation_from_rpy` is not called, because it would check the numbers again.
     T = np.eye(4)
     T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
     T[:3, 3] = joint.xyz
@@ -76,10 +76,7 @@ def _make_joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 
 
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
-    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w).
-
-    The quaternion may have any length except 0.
-    """
+    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length except 0."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
     return rpy_of(rotation_from_quaternion(scaled / np.linalg.norm(scaled)))
 
@@ -95,8 +92,8 @@ def _normalize(axis: FloatArray, joint: str) -> FloatArray:
 def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
-    # In urdfdom, the default of a position limit is zero.
-    # Position limits of a continuous joint have no effect.
+    # In urdfdom, the default of a position limit is zero. In the URDF specification, position limits of a
+    # continuous joint have no effect.
     return Limit(
         lower=(limit.lower or 0.0) if kind.has_limits else -math.inf,
         upper=(limit.upper or 0.0) if kind.has_limits else math.inf,
@@ -108,8 +105,8 @@ def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return a rule for each mimic joint, by joint name. The mimicked joint of each rule is independent.
 
-    Pinocchio and urdfkin combine the rules of a chain in the same order. The order begins with the
-    independent joint. Therefore, the rounding errors are equal.
+    urdfkin and Pinocchio combine the rules of a chain in the same order, beginning with the independent
+    joint. Therefore, the rounding errors are equal.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

@@ -1,7 +1,7 @@
-"""Records of a URDF's elements and joints, and limits on its size.
+"""Records of the XML elements and joints of a URDF, and limits on the size of a URDF.
 
-A joint record contains None for each unreadable `kind`, `parent`, `child` or `axis`. A missing origin or axis
-has the default value of the URDF specification.
+In the record of a joint, `kind`, `parent`, `child` and `axis` are None if the parser cannot read the value. A
+missing origin or axis has the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from dataclasses import dataclass, field, fields
 
 from urdfkin.errors.validators import as_int
 
-#: Maximum depth of nested elements that Pinocchio reads.
-#: In Pinocchio's parser tinyxml2, the document is level 1.
-#: The parser tinyxml2 refuses level 500.
+#: Maximum depth of nested elements in a URDF that Pinocchio reads. Pinocchio's parser tinyxml2 counts the
+#: document as level 1, and refuses level 500.
 ORACLE_DEPTH = 498
 
 
@@ -25,10 +24,10 @@ class SizeLimits:
     Attributes:
         depth: Maximum number of levels of nested elements. The default is Pinocchio's limit.
         attributes: Maximum number of attributes of one element.
-        name: Maximum length of the name of an element, attribute, link or joint.
+        name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
         markup: Maximum number of bytes of one tag, comment or processing instruction. The default is the
-            limit of libxml2. The file is read in pieces. Therefore, up to 1 MB more may be accepted.
+            limit of libxml2. urdfkin may accept up to 1 MB more, because it reads the file in pieces.
     """
 
     bytes: int = 100_000_000
@@ -74,7 +73,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        # An element without children has no list, to save memory.
+        # To save memory, an element without children has no list of children.
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -99,10 +98,7 @@ class Element:
 
     @property
     def top_level_element(self) -> Element:
-        """The child of `<robot>` that contains this element.
-
-        For `<robot>` and its children, this property is the element itself.
-        """
+        """The child of `<robot>` that contains this element; this element if it is `<robot>` or a child."""
         return self.top_level_ancestor or self
 
 

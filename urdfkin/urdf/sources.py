@@ -1,7 +1,7 @@
-"""Read a robot's text, and record how to load the robot again.
+"""Read the text of a robot from a source, and record how to load the robot again.
 
-A source is a path, an address, a catalogue name, text or bytes. An open file is also a source. An address
-begins with `package://` or `model://`. The source `-` is standard input.
+A source is a path, a `package://` or `model://` address, a catalogue name, text, bytes, an open file, or `-`
+for standard input.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Origin:
     """The arguments of `load`, and properties of the source.
 
     Attributes:
-        source: A path, a catalogue name, `-` (standard input), or a word such as `<text>`.
-        table: Whether a Denavit-Hartenberg table or a product of exponentials defines the robot.
+        source: A path, a catalogue name, `-` for standard input, or a word such as `<text>` or `<table>`.
+        table: Whether the robot was created from a Denavit-Hartenberg table or a product of exponentials.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are omitted.
     """
@@ -136,8 +136,8 @@ class UrdfText:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: A path, a catalogue name, `-` (standard input), or a word such as `<text>`.
-        sha256: The digest of the converted MJCF or USD file; empty for other sources.
+        source: A path, a catalogue name, `-` for standard input, or a word such as `<text>` or `<file>`.
+        sha256: The digest of the MJCF or USD file from which the URDF was converted; empty for other sources.
     """
 
     data: bytes
@@ -155,10 +155,10 @@ def read_source(
 ) -> UrdfText:
     """Read a URDF from any source.
 
-    At most `max_bytes` + 1 bytes of a URDF are read. For an open text file, the limit counts characters. With
-    the additional byte or character, the caller can recognize a longer source.
+    Read at most `max_bytes` + 1 bytes (or characters of an open text file) of a URDF, so that the caller can
+    recognize a longer source.
 
-    A catalogue name has priority over a file with this name. For a file `panda`, write `./panda`.
+    A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`.
 
     | Error | Cause |
     |---|---|
@@ -240,12 +240,12 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
 
 
 def _read_stream(stream: IO[str] | IO[bytes], max_bytes: int) -> UrdfText:
-    # Temporary files and pipes have a number as name.
+    # A temporary file or a pipe has a number instead of a path as its name.
     name = getattr(stream, "name", None)
     label = os.fsdecode(name) if name and isinstance(name, str | bytes) else "<file>"
     try:
         content: Any = stream.read(max_bytes + 1)
-        # A read from an unbuffered stream may be incomplete.
+        # One read from an unbuffered stream may return only a part of the content.
         while isinstance(stream, io.RawIOBase) and 0 < len(content) <= max_bytes:
             if not (more := stream.read(max_bytes + 1 - len(content))):
                 break
@@ -262,15 +262,15 @@ def _read_stream(stream: IO[str] | IO[bytes], max_bytes: int) -> UrdfText:
 
 
 def resolve_package_uri(source: T) -> T | Path:
-    """Return the path of a `package://` or `model://` address.
+    """Return the path of a `package://` or `model://` address; return any other source unchanged.
 
-    Return any other source unchanged. Raise SourceError if the package is not found.
+    Raise SourceError if the package is not found.
     """
     address = split_uri(source) if isinstance(source, str) else None
     if address is None:
         return source
     name, path = address
-    # The package is searched upwards from the current folder.
+    # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
@@ -283,7 +283,7 @@ def resolve_package_uri(source: T) -> T | Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> UrdfText:
-    # `surrogatepass` keeps a lone surrogate for the later check.
+    # `surrogatepass` keeps a lone surrogate. The check of the bytes reports it later.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return UrdfText(data, label, source)
 
@@ -301,16 +301,13 @@ def _read_file(path: Path, max_bytes: int) -> UrdfText:
 
 
 def unambiguous_path(path: Path) -> str:
-    """Return a path that is not also an option, text or catalogue name."""
+    """Return a path that cannot be mistaken for an option, URDF text or a catalogue name."""
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or find_entry(word) is not None else word
 
 
 def find_entry(name: str) -> CatalogueEntry | None:
-    """Return the catalogue entry of a name.
-
-    A text with a dot or path separator is not a name.
-    """
+    """Return the catalogue entry of a name; a text with a dot or a path separator is a path, not a name."""
     return None if "." in name or os.sep in name else catalogue().get(name)
 
 

@@ -1,24 +1,18 @@
-"""Convert the UsdPhysics joints of a USD stage to a kinematic tree.
+"""Convert the UsdPhysics joints of a USD stage (a scene of objects, called prims) to a kinematic tree.
 
-A stage is a scene of objects, called prims.
+- A prim with `PhysicsRigidBodyAPI` becomes a link; the scale of the prim's frame is removed. A plain `Xform`
+  prim below a body also becomes a link; a fixed joint connects this link with the body.
+- A joint prim contains two poses of the joint frame: pose A in the first body, and pose B in the second body.
+  With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
+  If the second body is the parent in the tree, urdfkin exchanges A and B and reverses the joint axis. The
+  pose of the first body in the second body is B J(q)^-1 A^-1.
+- Lengths are multiplied by `metersPerUnit`, and angles are converted from degrees. If the up axis is Y, the
+  robot is rotated, so that z is up.
+- Joints that close a loop, name a missing prim, or are excluded from the articulation are reported.
 
-A prim with `PhysicsRigidBodyAPI` becomes a link. The link frame is the prim's frame without scale. A plain
-`Xform` prim below a body also becomes a link. A fixed joint connects this link with the body.
-
-A joint prim contains two poses of the joint frame. A is the pose in the first body. B is the pose in the
-second body. The joint motion is J(q). In the first body, the second body has the pose A J(q) B^-1. If the
-second body is the parent, A and B are exchanged. The joint axis is then reversed. In the second body, the
-first body has the pose B J(q)^-1 A^-1.
-
-Lengths are multiplied by `metersPerUnit`. Angles are converted from degrees. If y is up, the robot is
-rotated, so that z is up.
-
-A joint that closes a loop or names a missing prim is reported. A joint that is excluded from the articulation
-is also reported.
-
-A stage consists of files, called layers. `find_layer_files` reads each layer before OpenUSD combines the
-layers. The function refuses references to network addresses. Files must be in the robot's folder, package or
-repository.
+A stage consists of files, called layers. Before OpenUSD combines the layers, `find_layer_files` reads each
+layer separately. `find_layer_files` refuses references to network addresses, and to files outside the robot's
+folder, package and repository.
 """
 
 from __future__ import annotations
@@ -65,37 +59,35 @@ from urdfkin.urdf.mjcf import (
 from urdfkin.urdf.sources import USD_SUFFIXES
 
 _MAX_LAYERS = 1_000
-#: In USD, a limit of this size means no limit.
+#: A USD limit of at least this size means no limit. The limit is infinite, or is the largest single-precision
+#: number.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
-#: Shear means |cosine of two axes| > `_MAX_SHEAR` u n.
-#: u is `SINGLE_ROUNDOFF`. The path of the prim has n prims.
-#: Error of a stored matrix entry: up to u.
-#: Additional error of a product in single precision: 3 u.
-#: Error of the cosine per prim: 2 sqrt(3) (u + 3 u) < 14 u.
-#: Length error of a stored unit quaternion: up to u.
-#: Effect of this length error on the cosine: 4 u.
+#: A frame has shear if the cosine between two axes of the frame exceeds `_MAX_SHEAR` * u * n. The path of the
+#: frame's prim contains n prims. The largest relative error of rounding to single precision is u. Each entry
+#: of a stored rotation matrix has a rounding error of at most u. The product of two rotation matrices in
+#: single precision adds an error of 3 u to each entry. Therefore, the scalar product of two columns has an
+#: error below 14 u (4 * 2 sqrt(3) u). Rounding changes the length of a stored quaternion by at most u.
+#: Therefore, the cosine between two axes changes by at most 4 u.
 _MAX_SHEAR = 14.0
-#: Rule USD303 checks only limits above this angle (degrees).
-#: A revolute joint with smaller limits hardly moves.
+#: Rule USD303 checks only limits above this angle (degrees), because a revolute joint with smaller limits
+#: hardly moves.
 _NEGLIGIBLE_LIMIT_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
-#: First bytes of a Git LFS pointer file.
-#: A pointer file replaces a file that was not downloaded.
+#: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Names of USD relationships to a mimicked joint. The regex group is a direction, such as rotX.
 _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: Words in the names of USD types and schemas.
-#: Such a type or schema couples joints or bodies.
+#: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
-#: Suffixes of joint types that a kinematic tree cannot represent.
-#: OpenUSD knows gear and rack-and-pinion joints only with a plugin.
+#: Suffixes of joint types that a kinematic tree cannot represent. OpenUSD recognizes gear joints and
+#: rack-and-pinion joints only with a plugin.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Nonlinear coefficients of MuJoCo's joint equality; mimic rules are linear.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _MOTION_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-#: Names of Xform prims that contain a body's shapes.
+#: Names of Xform prims that contain the shapes of a body.
 _SHAPE_XFORM_NAMES = ("visual", "visuals", "collision", "collisions")
 #: Rotation of the y axis onto the z axis.
 _ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -126,10 +118,10 @@ class UsdJoint:
     Attributes:
         directions: The directions in which the joint moves, such as `rotZ`.
         body0: Path of the first body; empty for the world.
-        p0: (3,) origin of the joint frame in `body0`, m.
-        quat0: (4,) unit quaternion of the joint frame in `body0`, scalar last.
+        p0: (3,) origin of the joint frame in the first body, m.
+        quat0: (4,) unit quaternion of the joint frame in the first body, scalar last.
         limits: Lower and upper limit, rad or m.
-        length_sum: Sum of the lengths of vectors (m). `p0` and `p1` are sums of these vectors.
+        length_sum: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`.
     """
 
     directions: str
@@ -152,7 +144,7 @@ class Usd:
 
     Attributes:
         prims: Path of the prim, by link name. A link without a prim has no entry.
-        rest_poses: (n, 4, 4) world poses of the prims, m, with z up. The order is the order of `prims`.
+        rest_poses: (n, 4, 4) poses of the prims in the world, in the order of `prims`, in m with z up.
             UsdGeom computes the poses.
         rest_q: (nq,) configuration in which the links have the poses `rest_poses`. For planar and floating
             joints, `rest_q` contains the neutral configuration.
@@ -166,7 +158,7 @@ class Usd:
             5. the distance (m) between the joint frame and the child frame.
         joints: The joint prims in the tree. The keys are the paths of the prims.
         meters_per_unit: The stage's metersPerUnit.
-        joint_names: Names of all joints, in the order of the stage's joint prims.
+        joint_names: Names of all joints, in the order of the joint prims in the stage.
     """
 
     tree: KinematicTree
@@ -241,7 +233,7 @@ def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips, because OpenUSD does not list the files of clips."""
+    """Refuse value clips, because OpenUSD does not list their files among the layer's dependencies."""
     found: list[str] = []
 
     def find_clips(path: Any) -> None:
@@ -256,10 +248,7 @@ def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
 
 
 def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths, where: str) -> str | None:
-    """Return the path of an asset, or None for a missing file.
-
-    Refuse a forbidden reference.
-    """
+    """Return the path of an asset, or None for a missing file; refuse a forbidden reference."""
     written = asset.partition(":SDF_FORMAT_ARGS:")[0]
     if not written:
         return None
@@ -271,7 +260,7 @@ def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
-        # OpenUSD searches beside the layer, then in the current folder.
+        # If there is no file beside the layer, OpenUSD searches in the current folder.
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
@@ -295,10 +284,9 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    `variants` are pairs of a variant set and a variant. The variants are selected in order. Each variant is
-    selected on every prim that has the variant set. `articulation` is the path or name of an articulation.
-    The path of an ancestor selects all articulations below the ancestor. `name` is the name of the stage in
-    messages.
+    `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
+    that has the variant set. `articulation` is the path or name of an articulation. The path of an ancestor
+    selects all articulations below the ancestor. `name` is the name of the stage in messages.
 
     | Error | Cause |
     |---|---|
@@ -323,10 +311,10 @@ def read_usd(
 
 
 def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants of a stage, and return the paths of expanded instances.
+    """Select variants of a stage, and return the paths of the instances that were expanded.
 
-    OpenUSD cannot select a variant inside an instance. Therefore, the instance is expanded to an ordinary
-    prim. All changes are in the session layer, which OpenUSD does not save.
+    OpenUSD cannot select a variant inside an instance, so the instance is expanded to an ordinary prim. All
+    changes are in the session layer, which OpenUSD does not save.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     expanded_instances = set[str]()
@@ -371,10 +359,10 @@ class _JointPrim:
     """A joint prim.
 
     Attributes:
-        name: Initially the prim's name, later the unique name in the tree.
-        ends: The paths of the two connected bodies. None is the world.
+        name: At first the name of the prim; later the unique name of the joint in the tree.
+        ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in the two bodies.
-        rounding: Bounds on single-precision errors of the joint frame: position (m), orientation (rad).
+        rounding: Bounds on the joint frame's single-precision errors in position (m) and orientation (rad).
     """
 
     prim: Any
@@ -486,7 +474,7 @@ class _StageReader:
         return prims
 
     def _read_value(self, prim: Any, name: str) -> Any:
-        """Return the value of an attribute, or its default, or None."""
+        """Return the value of an attribute; for a missing or blocked value, return the default or None."""
         attribute = prim.GetAttribute(name)
         if not attribute:
             return None
@@ -498,10 +486,7 @@ class _StageReader:
         return value
 
     def _refuse_wrong_type(self, attribute: Any) -> None:
-        """Refuse a value if its type differs from the schema.
-
-        OpenUSD's parser ignores such a value.
-        """
+        """Refuse a value if its type differs from the schema; OpenUSD's parser ignores such a value."""
         spec = next((one for one in attribute.GetPropertyStack() if one.HasDefaultValue()), None)
         if spec is not None and spec.typeName.type != attribute.GetTypeName().type:
             where, remedy = f"{self.source}: {attribute.GetPath()}", f"write {attribute.GetTypeName()}"
@@ -541,9 +526,9 @@ class _StageReader:
         return None
 
     def _world_pose(self, prim: Any) -> tuple[FloatArray, FloatArray]:
-        """Return the world pose (4, 4) and the scale (3,) of a prim.
+        """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,).
 
-        The pose is in m, with z up. A reflection gives three negative scales.
+        A reflection gives three negative scales.
         """
         self._report_timed_transforms(prim)
         where = f"{self.source}: {prim.GetPath()}"
@@ -590,7 +575,8 @@ class _StageReader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The direction in the name can differ from the joint's.
+            # The direction in the name of a relationship, such as rotX, can differ from the direction of the
+            # mimic joint.
             own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -602,7 +588,7 @@ class _StageReader:
             if not any(word in schema for word in _COUPLING_WORDS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # MjcEqualityJointAPI repeats NewtonMimicAPI's rule, and can add nonlinear terms.
+                # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add nonlinear terms.
                 if more := [name for name in _NONLINEAR_COEFFICIENTS if self._read_value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._report("left-out-of-usd", path, what)
@@ -613,7 +599,7 @@ class _StageReader:
             self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _find_articulation_root(self, prim: Any) -> str | None:
-        """Search an articulation root: the prim itself, or an ancestor."""
+        """Return the path of the articulation root at or above a prim, or None."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -659,8 +645,8 @@ class _StageReader:
             length_A + length_B,
             (error_bounds_A[0] + error_bounds_B[0], error_bounds_A[1] + error_bounds_B[1]),
         )
-        # Without a body, A or B is in z-up coordinates.
-        # `UsdJoint` uses the stage's world, where y can be up.
+        # If an end of the joint is the world, A or B is a pose in a world with z up. `UsdJoint` has the pose
+        # in the stage's world, where y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             directions, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -673,11 +659,11 @@ class _StageReader:
     def _read_joint_frame(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return body i of a joint, and the joint frame in body i.
+        """Return body i of a joint, the pose of the joint frame in the body, a length sum and error bounds.
 
-        Further return values are the length sum (m) of `UsdJoint`, and error bounds. The error bounds are for
-        position (m) and orientation (rad). The body None is the world. Return None if the body is missing or
-        in a point instancer.
+        The body None is the world. `UsdJoint` defines the length sum (m). The error bounds are for the
+        position (m) and the orientation (rad). Return None for a body that does not exist or is in a point
+        instancer.
         """
         p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
         quaternion = self._read_value(prim, f"physics:localRot{i}")
@@ -712,9 +698,9 @@ class _StageReader:
     ) -> tuple[float, float]:
         """Return bounds on a prim's single-precision errors in position (m) and orientation (rad).
 
-        The pose is relative to `body`. A chain of translations leads from the body to the prim.
-        `translation_length_sum` (m) is the sum of the translation lengths. A rotation error of a prim also
-        displaces all prims below the prim. Transforms in half precision are ignored.
+        The pose is relative to `body`. `translation_length_sum` is the sum of the lengths (m) of the
+        translations from the body to the prim. An error in the rotation of a prim also displaces all prims
+        below the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -734,10 +720,7 @@ class _StageReader:
         return any(str(path).startswith(one) for one in self._point_instancers)
 
     def _read_motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return kind, axis, limits (rad or m) and free directions.
-
-        Refuse an unsupported joint.
-        """
+        """Return kind, axis, limits (rad or m) and free directions; refuse an unsupported joint."""
         physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
         if prim.IsA(physics.FixedJoint):
             return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
@@ -852,12 +835,12 @@ class _StageReader:
         for path in self._bodies:
             if (key := find_representative(path)) in groups:
                 groups[key].bodies.append(path)
-        # Several groups attached to the world can form one articulation.
+        # An articulation may contain several groups that are attached to the world.
         merged: dict[str, list[_Articulation]] = {}
         for group in groups.values():
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
-                continue  # A single body fixed to the world is no robot.
+                continue  # A single body that is fixed to the world is not a robot.
             self._set_articulation_path(group)
             merged.setdefault(self._find_root(group) or group.path, []).append(group)
         articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
@@ -876,10 +859,7 @@ class _StageReader:
     def _choose_articulation(
         self, articulations: list[_Articulation], articulation: str | None
     ) -> _Articulation:
-        """Return the named articulation.
-
-        The path of an ancestor selects and joins all articulations below the ancestor.
-        """
+        """Return the named articulation; for the path of an ancestor, join all articulations below it."""
         if not articulations:
             message = "this stage has no joint between bodies"
             remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"
@@ -916,7 +896,7 @@ class _StageReader:
         return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
 
     def _find_root(self, group: _Articulation) -> str | None:
-        """Return the root body of a group; None is the world."""
+        """Return the root body of a group, or None if the root is the world."""
         if any(None in edge.ends for edge in group.edges):
             return None
         if group.path in group.bodies:
@@ -1032,10 +1012,9 @@ class _StageReader:
         if (np.eye(4) == B).all():
             yield joint, here, there
             return
-        # In URDF, joint and child link have the same frame.
-        # In USD, these frames can differ.
-        # If the frames differ, the joint moves an additional link.
-        # A fixed joint connects the additional link and child link.
+        # In a URDF, joint and child link have the same frame. If the frames of a USD joint and its child
+        # differ, the joint moves an additional link. A fixed joint connects the additional link with the
+        # child link.
         between = make_unique(f"{name}_link", self._used_link_names)
         yield joint, here, between
         yield (
@@ -1074,7 +1053,7 @@ class _StageReader:
         return Limit(lower, upper, rate, math.inf)
 
     def _find_frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield the Xform prims that become links, as pairs of prim and body."""
+        """Yield the path of each Xform prim that becomes a link, with the path of the body above the prim."""
         body_api, shape = self.pxr.UsdPhysics.RigidBodyAPI, self.pxr.UsdGeom.Gprim
 
         def find_child_frames(prim: Any, body: str) -> Iterator[tuple[str, str]]:
@@ -1130,10 +1109,7 @@ class _StageReader:
             yield by_path[path].name, replace(rule, mimicked_joint=by_path[rule.mimicked_joint].name)
 
     def _read_mimic_rules(self, edge: _JointPrim) -> Iterator[Mimic]:
-        """Yield the mimic rules of a joint, with offset in rad or m.
-
-        `mimicked_joint` is the path of a prim.
-        """
+        """Yield the mimic rules of a joint (offset in rad or m); `mimicked_joint` is the path of a prim."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1264,18 +1240,19 @@ class _StageReader:
 
 
 def _rounding(x: FloatArray) -> FloatArray:
-    """Return half a single-precision ulp for each number, or 0 for 0."""
+    """Return half an ulp in single precision for each number, or 0 for a zero."""
     half = 0.5 * np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
     return np.asarray(np.where(x == 0.0, 0.0, half))
 
 
 def _quaternion_rounding(xyzw: FloatArray) -> float:
-    """Return a bound (rad) on the rotation error of a single-precision quaternion.
+    """Return a bound (rad) on the error of a rotation from a quaternion rounded to single precision.
 
-    The rotation changes by twice the angle between exact and rounded quaternion. Each of the four numbers
-    changes by at most its rounding error. Therefore, the quaternion error is a vector in a four-dimensional
-    box. A component parallel to the quaternion does not change the rotation. The perpendicular component is
-    longest at a corner of the box. Therefore, all corners are compared.
+    The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
+    numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a
+    four-dimensional box. Only the component of this vector that is perpendicular to the quaternion changes
+    the rotation. The perpendicular component is longest at a corner of the box. Therefore, all corners are
+    compared.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))

@@ -1,7 +1,8 @@
-"""Write a `KinematicTree` as URDF text, and edit existing text.
+"""Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
 Each number has enough digits to restore the same double. A rotation is written as roll, pitch and yaw. URDF
-readers restore the rotation up to rounding errors. In an existing text, the byte order mark is not counted.
+readers restore the rotation up to rounding errors. In an existing text, byte 0 is the first byte after a byte
+order mark.
 """
 
 from __future__ import annotations
@@ -18,16 +19,15 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 
 
 def to_urdf(tree: KinematicTree, joint_names: Sequence[str] | None = None) -> str:
-    """Write the links and joints of a tree as URDF.
+    """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    Shapes and masses are not written. `joint_names` is the order of joints and child links. None: the tree's
-    order.
+    `joint_names` is the order of all joints, and of their child links, in the text. None: the tree's order.
 
     URDF 1.0 requires finite limits of effort and velocity in a <limit> element. Infinite limits are omitted.
-    The file declares version 1.2 if a <limit> element lacks effort or velocity.
+    If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
 
-    Raise InputError for a revolute or prismatic joint without finite position limits. A name with a character
-    that XML does not allow also raises InputError.
+    Raise InputError if a revolute or prismatic joint has no finite position limits, or if a name contains a
+    character that XML does not allow.
     """
     version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{escape_attribute(tree.name)}"{version}>']
@@ -45,7 +45,7 @@ def _needs_version_1_2(joint: Joint) -> bool:
     if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # A joint without any finite limit needs no <limit> element.
+    # If effort and velocity are infinite, a joint without position limits needs no <limit> element.
     return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 
@@ -92,10 +92,7 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;",
 
 
 def escape_attribute(text: str) -> str:
-    """Escape the value of an attribute.
-
-    Raise InputError for a character that XML does not allow.
-    """
+    """Escape the value of an attribute; raise InputError for a character that XML does not allow."""
     if bad := _INVALID_CHARACTER.search(text):
         found = f"U+{ord(bad[0]):04X}"
         raise InputError("XML does not allow this character", where=repr(text), found=found)
@@ -128,9 +125,6 @@ def make_attribute_edits(data: bytes, target: Element, values: Mapping[str, str]
 
 
 def make_insertion_before_element(data: bytes, target: Element, element: str) -> Edit:
-    """Return the edit that inserts the text `element` before `target`.
-
-    The inserted element and `target` have the same indentation.
-    """
+    """Return the edit that inserts the text `element` before `target`, with the same indentation."""
     indentation = _INDENTATION_PATTERN.search(data[max(0, target.offset - 1000) : target.offset])
     return Edit(target.offset, target.offset, element + (indentation[1].decode() if indentation else ""))

@@ -1,10 +1,10 @@
-"""Expand a .xacro file to URDF text in a separate, restricted process.
+"""Expand a .xacro file to URDF text, in a separate process with restricted rights.
 
-A xacro file is a program, and may come from an untrusted source. The page docs/xacro.md lists the allowed
-operations. The module `expanding` contains the code of the separate process.
+A xacro file is a program, and may come from an untrusted source. docs/xacro.md lists the operations that a
+xacro file may do. The module `expanding` contains the code of the separate process.
 
-An argument that the file neither declares nor uses is an error. The package xacro ignores such an argument.
-If an included file cannot be read, every argument is accepted.
+xacro itself ignores an argument that the file neither declares nor uses, but urdfkin raises an error. If
+urdfkin cannot read one of the included files, every argument is accepted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
 from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum size (bytes) and number of searched files.
+#: Limits of the search for declared arguments: bytes per file, and number of files.
 MAX_SEARCHED_BYTES, MAX_SEARCHED_FILES = 10_000_000, 200
 
 #: Function that returns a package's folder, or raises LookupError.
@@ -45,13 +45,10 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 
 
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
-    """Return the names of the arguments that a xacro file declares or uses.
+    """Return the names of the arguments that a xacro file and its included files declare or use.
 
-    Included files are also searched. Return None if the names may be incomplete:
-
-    - A file cannot be found or read.
-    - The name of a file or argument is computed.
-    - There are more than `MAX_SEARCHED_FILES` files.
+    Return None if the names may be incomplete: a file cannot be found or read, the name of a file or an
+    argument is computed, or there are more than `MAX_SEARCHED_FILES` files.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
@@ -76,7 +73,7 @@ def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
 
 
 def _find_used_arguments(text: str) -> set[str]:
-    """Return the arguments in a text, and all names in `$(eval ...)`.
+    """Return the names of arguments in a text, and all names in `$(eval ...)`.
 
     Raise LookupError if the name in a call of `xacro.arg` is computed.
     """
@@ -91,10 +88,7 @@ def _find_used_arguments(text: str) -> set[str]:
 
 
 def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> Path:
-    """Return the path of an included file.
-
-    Raise LookupError for a computed name or an unknown package.
-    """
+    """Return the path of an included file; raise LookupError for a computed name or an unknown package."""
     folder = referring_file.parent
     if match := _PACKAGE_USE.match(name):
         folder = Path(find(match[1]))
@@ -104,8 +98,7 @@ def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> P
     return folder / name
 
 
-#: Maximum time of an expansion (s).
-#: A macro may call itself without end.
+#: Maximum time of an expansion (s), because a macro may call itself without end.
 EXPANSION_TIMEOUT = 60.0
 
 MAX_EXPANDED_BYTES = 100_000_000

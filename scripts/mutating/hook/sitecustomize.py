@@ -1,11 +1,11 @@
-"""Replace one module of the package by a mutant, at the module's import.
+"""Replace one module of the package by a mutant when the module is imported.
 
-This file is in a folder on PYTHONPATH. Each Python process of a test run therefore loads the file at its
-start.
+This file is in a folder on PYTHONPATH, so that each Python process of a test run loads it at its start.
 
-The variable `URDFKIN_MUTANT` is a module's name and a mutant's number, for example
-`urdfkin.validation.error_stats:17`. Without a number, the variable `URDFKIN_MUTANT_CODE` is a JSON list of
-three texts. The texts are a function's name, a piece of the function's code, and the new code.
+The environment variable `URDFKIN_MUTANT` is the module's name and the mutant's number, for example
+`urdfkin.validation.error_stats:17`. If `URDFKIN_MUTANT` has no number, the variable
+`URDFKIN_MUTANT_CODE` is a JSON list of three texts: the name of a function, a piece of its code, and the new
+code.
 """
 
 import importlib.abc

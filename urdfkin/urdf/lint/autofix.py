@@ -1,17 +1,16 @@
-"""Apply automatic fixes to a URDF, and write the changes as a patch.
+"""Apply automatic fixes to a URDF, check that the robot does not change, and write the changes as a patch.
 
-A pass applies the fixes of one code, such as URDF507. A new file is accepted if three conditions hold:
+A pass applies the fixes of one code, such as URDF507. urdfkin accepts the new file if three conditions hold:
 
 - The number of findings falls by at least the number of fixes.
-- The new file has no new findings. Codes with more than 10,000 findings are not compared.
-- The new file describes the same robot. All names and numbers that URDF readers use are equal.
+- The new file has no new findings. urdfkin does not compare codes with more than 10,000 findings.
+- The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
+  exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
+  change by at most `Fix.max_rotation` (rad).
 
-There are two exceptions from the last condition. A joint axis may rotate by the rounding error of its
-numbers. The rotation of a joint origin may change by at most `Fix.max_rotation` (rad).
-
-Text in a file can control a terminal or a CI service. An escape sequence is an example. Therefore, such lines
-are escaped in the patch. However, `git apply` refuses escaped lines. The patch is then a git binary patch. A
-comment before the binary patch shows the escaped lines.
+A line of the file can contain text that controls a terminal or a CI service, for example an escape sequence.
+urdfkin escapes this text, but `git apply` refuses escaped lines. Therefore, if a line must be escaped,
+urdfkin writes a git binary patch, and before the patch a comment that shows the escaped lines.
 """
 
 from __future__ import annotations
@@ -34,11 +33,11 @@ from urdfkin.urdf.lint.runner import Examination
 from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import UrdfText
 
-#: Maximum number of passes of `--fix` over a file.
-#: A pass applies the fixes of one code, without overlaps.
+#: Maximum number of passes of `--fix` over a file. A pass applies the fixes of one code, and skips a fix that
+#: overlaps the previous applied fix.
 MAX_PASSES = 100
 
-#: Maximum rotation (rad) of a unit vector due to rounding.
+#: Rounding to doubles rotates a unit vector by at most this angle (rad).
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
@@ -58,7 +57,7 @@ def fix_text(
 ) -> FixResult:
     """Apply the automatic fixes, unless the file has a finding of severity error.
 
-    `choose` is called before each pass. The returned function selects the findings to fix.
+    `choose` is called before each pass, and returns a function that selects the findings to fix.
     """
     current, fixed, unfixed_reasons = examine(text), list[Finding](), dict[str, str]()
     for _ in range(MAX_PASSES):
@@ -120,7 +119,7 @@ def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str,
 
 
 def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str | None:
-    # The rotation is at most the sum of angle changes.
+    # The frame rotates by at most the sum of the changes of roll, pitch and yaw.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {
@@ -134,15 +133,12 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: This factor covers rounding errors in sums of `Fix.max_rotation`.
+#: This factor covers the rounding errors of the sum of the angles `Fix.max_rotation`.
 _ROTATION_SUM_FACTOR = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`.
-
-    The computation is exact.
-    """
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`; the computation is exact."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)
@@ -164,16 +160,12 @@ def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
 
 
 _PATCH_BYTES_PER_LINE = 52
-#: First letter of a line in git's binary patch.
-#: The letter encodes the number of bytes.
+#: The first letter of a line in git's binary patch encodes the number of bytes of the line: A is 1, B is 2.
 _PATCH_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def make_patch(file: str, before: bytes, after: bytes, escape: Callable[[str], str]) -> str:
-    """Return the patch of one UTF-8 file.
-
-    `escape` escapes the control characters of a text.
-    """
+    """Return the patch of one UTF-8 file; `escape` escapes the control characters of a text."""
     if before == after:
         return ""
     name = _relative_path(file)
@@ -190,7 +182,7 @@ def _relative_path(file: str) -> str:
 
 
 def _make_unified_diff(name: str, before: bytes, after: bytes) -> str:
-    end = "\t" if " " in name else ""  # Git needs a tab after a file name with spaces.
+    end = "\t" if " " in name else ""  # Git needs a tab after a file name that contains spaces.
     old, new = (f"{_quote_file_name(f'{side}/{name}')}{end}" for side in "ab")
     # Like git, StringIO ends lines only at line feeds.
     a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))

@@ -28,10 +28,10 @@ def as_sarif(
     silenced_findings: Sequence[tuple[Finding, str]] = (),
     files_with_mark: Collection[str] = (),
 ) -> str:
-    """Return a SARIF document: all URDF rules, and a result for each finding.
+    """Return a SARIF document with all rules about URDF files, and a result for each finding.
 
-    MJCF and USD rules are included only if findings have their codes. `files_with_mark` contains the files
-    that begin with a byte order mark. In SARIF, a byte offset of a fix counts this mark.
+    Rules about MJCF and USD are included only if a finding has their code. `files_with_mark` contains the
+    files that begin with a byte order mark. In SARIF, a byte offset of a fix counts this mark.
     """
     codes = {finding.code for finding in findings}
     rules = URDF_RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
@@ -107,8 +107,7 @@ def _uri(file: str) -> str:
     return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
 
 
-#: Version of the JSON format.
-#: The version changes if a field is removed or redefined.
+#: Version of the JSON format. The number changes if a field is removed or changes its meaning.
 JSON_VERSION = 1
 
 
@@ -117,10 +116,7 @@ def format_summary(findings: Sequence[Finding], files: int) -> str:
 
 
 def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield a line for each code.
-
-    `[*]` means that `--fix` can fix at least one finding.
-    """
+    """Yield a line for each code; `[*]` means that `--fix` can fix at least one finding with this code."""
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count

@@ -1,13 +1,13 @@
-"""Find rules by code, and return their documentation as data or text.
+"""Find a rule by its code, and return the documentation of each rule as data and as text.
 
 The rules are defined in the parser and in the modules of `lint.rules`. Each module has a TOML file beside the
-module. For example, `joints.toml` belongs to `joints.py`. The TOML file has a table for each rule, such as
-[URDF502]. The table contains the texts of the rule's page. An entry before all tables is the default for all
-pages. An example is `correction`.
+module. For example, `joints.toml` belongs to `joints.py`. For each rule of the module, the file has one TOML
+table, such as [URDF502]. The table contains the texts of the rule's page. An entry at the top of the file,
+such as `correction`, is the default for all pages.
 
-The table `parts` defines texts that replace `{name}` in examples. An entry is a string, or [text, times] for
-a repeated text. In a repeated text, `{i}` is the index of the repetition. Line breaks in prose have no
-meaning.
+The table `parts` defines texts that replace `{name}` in examples. Each entry is a string, or a pair
+[text, times] for a repeated text. In a repeated text, `{i}` is the index of the repetition. Line breaks in
+prose have no meaning.
 """
 
 from __future__ import annotations
@@ -52,9 +52,8 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        example: A minimal example with the problem. The example is a whole document, or the content of
-            `<robot>`. Some examples begin with a joint or a comment. Such an example needs the links `base`
-            and `tip`.
+        example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
+            example begins with a joint or a comment, the links `base` and `tip` must be added.
         other_readers: The behaviour of other readers of the format for the example. For URDF, these readers
             are Pinocchio (urdfdom) and yourdfpy.
     """
@@ -120,9 +119,8 @@ def find_rule(word: str) -> Rule:
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:
-    """Return the rules that a word selects.
+    """Return the rules that a word selects: a code, a short name, the first digits of codes, or ALL.
 
-    A word is a code, a short name, the first digits of codes, or ALL.
     Raise UnknownNameError if the word selects no rule.
 
     >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))

@@ -70,8 +70,8 @@ def check(
 
     Raises:
         SourceError: the file cannot be read, or the package of a `package://` address is not found.
-        UnknownNameError: the source is neither a file nor a catalogue name, or `xacro_args` contains an
-            unknown name. The message lists the nearest names.
+        UnknownNameError: the source is neither a file nor a catalogue name, or the .xacro file does not
+            declare an argument in `xacro_args`. The message lists the nearest names.
         InputError: an argument has a wrong type or value.
         UrdfkinError: xacro cannot expand the file.
 
@@ -149,10 +149,7 @@ def check_text(
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Parse and check the file of `report`.
-
-    Return None if the file is not a URDF.
-    """
+    """Parse and check the file of `report`; return None if the file is not a URDF."""
     root = read_document(report)
     apply_comments(report, CODE_BY_NAME)
     robot = None if root is None else read_robot(report, root)

@@ -1,4 +1,4 @@
-"""Find files and settings for `urdfkin check`, and select the reported findings.
+"""Find the files and the settings for `urdfkin check`, and select the findings to report.
 
 The settings are in pyproject.toml:
 
@@ -9,12 +9,12 @@ The settings are in pyproject.toml:
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
 Files and patterns in the settings are relative to the folder of pyproject.toml. The patterns of `include`
-are an exception. These patterns are compared with file names.
+are an exception: urdfkin compares them with file names.
 
-The settings select the codes of findings, and can hide notes. A selected finding is not reported if it is
-known. The findings of an older version of the file are known. The findings in a baseline, a JSON file, are
-also known. The comparison uses file, code, severity, element, name and wrong text. Line numbers are not
-compared. Therefore, a finding stays known after edits of other lines.
+The settings select the codes of findings, and can hide notes. A selected finding is reported if it is neither
+in the baseline nor in an older version of the file. A baseline is a JSON file with known findings. A finding
+is known if the baseline has an entry with the same file, code, severity, element, name and wrong text. Line
+numbers are not compared, so a finding is still known after you edit other lines.
 """
 
 from __future__ import annotations
@@ -40,8 +40,7 @@ from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
 from urdfkin.urdf.lint.runner import Examination, find_local_path
 from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 
-#: Version of the baseline format.
-#: The version changes if a field is removed or redefined.
+#: Version of the baseline format. The number changes if a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
 BaselineKey = tuple[str, ...]
@@ -74,7 +73,7 @@ class Baseline:
         return True
 
     def count_unmatched(self, files: Iterable[str]) -> int:
-        """Count the known findings in `files` that the run has not found."""
+        """Return the number of known findings in `files` that the run has not found."""
         checked = {relative_path(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -107,8 +106,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    The file `path` can contain an older baseline. The older entries are copied, with two exceptions. Entries
-    about a file in `files` are omitted. Entries about a deleted file are also omitted.
+    If the file `path` contains an older baseline, the older entries are copied, except entries about a file
+    in `files` and entries about a deleted file.
     """
     counts = Counter(baseline_key(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -134,17 +133,14 @@ _TYPE_NAMES = {
     str: "a string",
 }
 
-#: Default patterns of robot files.
-#: Most .xacro files describe only a part of a robot.
+#: Default patterns of robot files. There is no pattern for .xacro, because most .xacro files describe only a
+#: part of a robot.
 DEFAULT_INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The checked settings of a file.
-
-    `file` is None if no file contains settings.
-    """
+    """The checked settings of a file; `file` is None if no file contains settings."""
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -160,16 +156,10 @@ class Settings:
 
 
 def find_settings(start: Path) -> Settings:
-    """Return the settings of the nearest pyproject.toml with a table [tool.urdfkin].
+    """Return the settings of the nearest pyproject.toml with a table [tool.urdfkin], or empty settings.
 
-    The search goes upwards from `start`. The last searched folder is the first folder that contains .git. If
-    no table is found, return empty settings.
-
-    | Error | Cause |
-    |---|---|
-    | InputError | an invalid setting |
-    | UnknownNameError | an unknown setting |
-    | SourceError | the baseline does not exist |
+    The search goes upwards from `start`, up to the first folder that contains .git. Raise InputError for an
+    invalid setting, UnknownNameError for an unknown setting, and SourceError if the baseline does not exist.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -229,9 +219,9 @@ def find_codes(words: Iterable[str]) -> frozenset[str]:
 def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     """Return whether a pattern matches a file or a folder above it.
 
-    The path is relative to `root`. A pattern without a slash is compared with each name in the path. A
-    pattern with a slash is compared with the path and its parents. `*` matches any characters,
-    including slashes.
+    The path is relative to `root`. A pattern without a slash is compared with the name of the file and of
+    each folder in the path. A pattern with a slash is compared with the relative path of the file and of each
+    folder above the file. `*` matches any characters, including slashes.
 
     >>> matches("robots/old/arm.urdf", ["old"], Path()), matches("robots/arm.urdf", ["robots/o*"], Path())
     (True, False)
@@ -276,10 +266,7 @@ class FindingFilter:
     def make_independent_predicate(
         self, text: UrdfText, older_findings: Baseline | None = None
     ) -> Callable[[Finding], bool]:
-        """Call `make_predicate` with copies of the baselines.
-
-        The baselines themselves do not change.
-        """
+        """Call `make_predicate` with copies of the baselines, so that the originals do not change."""
         copies = [
             known and replace(known, counts=Counter(known.counts))
             for known in (self.baseline, older_findings)
@@ -293,11 +280,11 @@ def find_known_findings(
     """Return the findings of the older version of a file.
 
     Return None if the older version certainly has all current findings. All findings of an unchanged file are
-    known. There are two exceptions:
+    known, with two exceptions:
 
-    - A xacro file may include a changed file. All findings of the xacro file are then new. Only changed files
-      with a suffix of `_XACRO_INCLUDE_SUFFIXES` count.
-    - The URDF contains the name of a deleted file. All findings about missing meshes are then new.
+    - All findings of a xacro file are new if a file with a suffix of `_XACRO_INCLUDE_SUFFIXES` has changed.
+      The reason is that the xacro file may include the changed file.
+    - All findings about missing meshes are new if the URDF contains the name of a file that was deleted.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
@@ -318,7 +305,7 @@ def find_known_findings(
     )
 
 
-#: ROS's build tools and urdfkin skip folders with such files.
+#: urdfkin and ROS's build tools skip a folder that contains one of these files.
 FOLDER_IGNORE_FILES = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 

@@ -15,19 +15,19 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest plausible mass, kg.
-#: Largest plausible coordinate of a centre of mass, m.
+#: Largest plausible mass (kg), and largest plausible coordinate of a centre of mass (m).
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
-#: A smaller nonzero mass (kg) is probably a placeholder.
-#: For a smaller mass, moments of inertia are not checked.
+#: A nonzero mass (kg) below this number is probably a placeholder, so the moments of inertia of the body are
+#: not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Tolerance of a principal moment, divided by the mass (m^2).
-#: The value follows from a gyration radius of 0.03 mm.
+#: Tolerance of the checks of the principal moments, divided by the mass (m^2). No moment may be negative, or
+#: larger than the sum of the other two. A body of 1 kg with a radius of gyration of 0.03 mm has about this
+#: moment.
 NEGLIGIBLE_MOMENT = 1e-9
 
-#: Relative rounding error of moments: exporters write few digits.
+#: Relative rounding error of the moments of inertia, which exporters write with few digits.
 _MOMENT_PRECISION = 1e-6
 
 _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -134,7 +134,8 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE_NUMBER = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY_INCOMPLETE = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of each shape: (name, count of numbers, required).
+#: Numeric attributes of each shape. A tuple contains the attribute's name, its count of numbers, and whether
+#: it is required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

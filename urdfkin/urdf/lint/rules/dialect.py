@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quote(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Only xacro directly in <robot>, or in <joint>, changes kinematics.
+    # Only xacro elements directly inside <robot>, or anywhere inside <joint>, can change kinematics.
     if _report_xacro(
         report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_level_element.tag == "joint"
     ):
@@ -95,7 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: (element, attribute name), or (element, None) for the element itself.
+#: An element, and the name of an attribute or None for the element itself.
 _ElementOrAttribute = tuple[Element, str | None]
 
 
@@ -158,9 +158,8 @@ _VENDOR_NAMES_TEXT = (
 )
 VENDOR_NAMES = frozenset(_VENDOR_NAMES_TEXT.split())
 
-#: Each line has the form `element: attributes > child elements`.
-#: Without a colon, the element's attributes are not checked.
-#: Without a line, the element's content is not checked.
+#: Each line has the form `element: attributes > child elements`. If a line has no colon, the attributes of
+#: the element are not checked. If an element has no line, the content of the element is not checked.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -190,8 +189,7 @@ ATTRIBUTES = {
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
 _POSE_NAMES_OF_OTHER_FORMATS = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Names that URDF, a simulator or another format defines.
-#: `--fix` does not remove attributes with these names.
+#: Names that URDF, a simulator or another format defines. `--fix` keeps attributes with these names.
 _KEPT_ATTRIBUTES = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_OF_OTHER_FORMATS | VENDOR_NAMES
 
 #: Child elements that may occur only once.
@@ -261,7 +259,7 @@ def walk_outside_extensions(element: Element) -> Iterator[Element]:
 
 
 def _is_link_or_joint(element: Element) -> bool:
-    """Return whether an element is a link or joint. The tag may be misspelt."""
+    """Return whether an element is a link or joint, possibly with a misspelt tag."""
     tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MISSPELT_LENGTH_BOUND else None
     if tag == "link":
         return "name" in element.attributes
@@ -336,8 +334,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
-#: Rules URDF202 and URDF112 report tags with these beginnings.
-#: Therefore, rule URDF214 skips these tags.
+#: URDF214 skips tags with these beginnings, because URDF202 and URDF112 report them.
 _PREFIXES_OF_OTHER_RULES = ("xacro:", "xi:include")
 
 
@@ -371,7 +368,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_ElementOrAttribu
 
 
 def _find_prefix_uses(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix, and the attribute name or None for the tag."""
+    """Yield each namespace prefix, with the name of the attribute that has it, or None for the tag."""
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
@@ -385,8 +382,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 LINE_BREAK_IN_NAME = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Rule URDF405 reports longer names.
-#: Long names break tables and file paths.
+#: URDF405 reports longer names, because they break tables and file paths.
 MAX_NAME_LENGTH = 200
 
 
@@ -454,7 +450,7 @@ def _check_lookalikes(report: Reporter, named_elements: list[tuple[str, Element]
     seen: dict[str, str] = {}
     for name, element in named_elements:
         if name.isascii() or len(name) > MAX_NAME_LENGTH:
-            continue  # Long names are slow to compare; URDF405 reports long names.
+            continue  # Long names are slow to compare, and URDF405 already reports long names.
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:

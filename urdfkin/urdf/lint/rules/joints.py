@@ -1,7 +1,7 @@
-"""Check that the joints form one tree. Check axes, limits and mimic rules.
+"""Check that joints connect all links in one tree, and have usable axes, limits and mimic rules.
 
-Probable mistakes are also reported: rounded pi, degrees, millimetres, equal joints. No function is recursive.
-A chain of 50,000 links would exceed Python's recursion limit.
+Legal values that are probably mistakes are also reported: rounded pi, degrees, millimetres, equal joints. No
+function is recursive, because a chain of 50,000 links would exceed Python's recursion limit.
 """
 
 from __future__ import annotations
@@ -112,17 +112,15 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _check_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent.
-
-    Report any further link without a parent.
-    """
+    """Return whether exactly one link has no parent; report any further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.has_errors:
         report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
-    # A root may be the missing child of a joint.
+    # If the child link of a joint does not exist, a link without a parent may be the intended child, so it is
+    # not reported.
     if not children <= robot.links.keys():
         return False
     parents = {joint.parent for joint in robot.joints}
@@ -140,22 +138,22 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: A smaller error of an axis length is a note.
-#: An axis with few digits has such an error.
+#: If the length of an axis differs from 1 by less than this number, the finding is only a note, because the
+#: axis is probably rounded to few digits.
 NOTE_LENGTH_ERROR = 2e-4
 
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: Maximum |(x, y)| / z of a z axis (x, y, z).
+#: An axis (x, y, z) counts as the z axis if z > 0 and |(x, y)| is at most this fraction of z.
 _Z_AXIS_TOLERANCE = 1e-9
 
-#: Default relative tolerance of Eigen's function `isApprox`.
-#: Within this tolerance, Pinocchio uses a coordinate axis.
+#: Pinocchio replaces an axis by a coordinate axis if their relative difference is at most this number. The
+#: number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: Maximum tilt (rad) of an axis that is not reported.
-#: The error bounds in `verify.bounds` cover this tilt.
+#: Largest angle (rad) between an axis and a coordinate axis that is not reported. The error bounds in
+#: `verify.bounds` cover this angle.
 _NEGLIGIBLE_TILT = 2.0**-52
 
 
@@ -203,10 +201,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
-    """Divide a vector by its length.
-
-    Rounding rotates the result by at most 2**-53 rad.
-    """
+    """Divide a vector by its length; rounding rotates the result by at most 2**-53 rad."""
     with localcontext(prec=60):
         numbers = [Decimal(x) for x in vector]
         length = sum((x * x for x in numbers), Decimal(0)).sqrt()
@@ -228,18 +223,18 @@ def _check_snapped_axis(
 
 
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) between the file's axis and Pinocchio's axis.
+    """Return the angle (rad) between the axis in the file and Pinocchio's axis, by joint name.
 
-    The keys are joint names. Joints with an angle of at most 2^-52 rad have no entry.
+    Joints with an angle of at most 2^-52 rad have no entry.
     """
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
 
 
 def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses, and its angle (rad) to `axis`.
+    """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them.
 
-    Return None if Pinocchio uses `axis` itself. Return None also if the angle is at most `_NEGLIGIBLE_TILT`.
+    Return None if Pinocchio uses `axis` itself, or if the angle is at most `_NEGLIGIBLE_TILT`.
     """
     if axis is None:
         return None
@@ -279,7 +274,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # From URDF 1.2, urdfdom checks all joint types.
+    strict = version >= (1, 2)  # From URDF 1.2, urdfdom checks the limits of all joint types.
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -335,10 +330,10 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest plausible mimic multiplier or offset (rad or m).
+#: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: Limits may exclude this fraction of the mimicked joint's range.
-#: Limits with few digits often exclude a smaller fraction.
+#: URDF527 reports limits that exclude more than this fraction of the mimicked joint's range. Limits with few
+#: digits often exclude a smaller part.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -446,8 +441,7 @@ class _MimicChecker:
         if is_allowed(bounds):
             return
         low, high = restrict_range(rule, bounds, *moving)
-        # `restrict_range` subtracts a rounding error at each end.
-        # A range of one value becomes empty.
+        # `restrict_range` subtracts a rounding error at both ends, so a range of one value becomes empty.
         # Therefore, each end of `moving` is tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
@@ -488,10 +482,7 @@ class _MimicChecker:
 
 
 def _joint_range(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a revolute or prismatic joint.
-
-    The limits of a continuous joint are +- pi. Otherwise, return None.
-    """
+    """Return the limits of a revolute or prismatic joint, or +- pi for a continuous joint; otherwise None."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -524,24 +515,25 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 LENGTH_OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL_OUTSIDE_LIMITS = Rule("URDF608", "neutral-outside", NOTE)
 
-#: Coordinates (m) of at least this number are probably millimetres.
+#: A coordinate of a joint origin, or a limit of a prismatic joint, is probably in millimetres if it is at
+#: least this number (m).
 SUSPICIOUS_LENGTH = 100.0
 
-#: Minimum plausible length (m) of a robot's longest chain.
-#: The lengths of a smaller robot were probably scaled twice.
+#: If the longest chain of a robot is shorter than this length (m), the lengths were probably scaled twice.
 MIN_PLAUSIBLE_ROBOT_SIZE = 1e-4
 
-#: Whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
-#: Some exporters write larger placeholders for joints without limits.
+#: A whole-number limit is probably in degrees if `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`. For a
+#: joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: A warning reports a rounded angle that moves a link by more (m).
+#: A rounded angle is a warning if the rounding can move the links below the joint by more than this length
+#: (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
-#: Angles within this tolerance (rad) of k pi are exact.
+#: An angle that differs from k * pi by at most this number (rad) counts as exact.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs (k, n): the file's number for k * pi has at least n decimals.
+#: Pairs (k, n): a number counts as a rounded k * pi only if it has at least n decimals in the file.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -595,7 +587,7 @@ def _check_rounded(
 ) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
-    `reach` (m) bounds the distance to the links below. The text `condition` limits the validity of the bound.
+    `reach` (m) bounds the distance to the links below; `condition` is the condition of this bound as text.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
@@ -636,10 +628,10 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 
 
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return k > 0 and the exact angle k * pi or -k * pi.
+    """Return k > 0 and the exact angle if `angle` is a rounded multiple of pi, otherwise None.
 
-    Return None if `angle` is not a rounded multiple of pi. `text` is the angle in the file. `angle` is the
-    value of `text` (rad).
+    The exact angle is k * pi or -k * pi. `text` is the angle as written in the file, and `angle` is the
+    number (rad).
 
     >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -720,9 +712,9 @@ def _check_equal_joints(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return an upper bound (m) on each link's distance to its descendants.
+    """Return an upper bound (m) on each link's distance to its descendants, by link name.
 
-    The keys are link names. The bounds assume that all translations of joints are 0.
+    The bounds assume that all translations of joints are 0.
     """
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})

@@ -1,8 +1,8 @@
-"""Findings of `load` about MJCF and USD.
+"""Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes.
 
-The findings are about unsupported parts and probable mistakes. A finding names an MJCF element by
-tag and name. A USD prim is named by its path. The finding also contains the line of the element or prim. Only
-the first 10 MB of the file are searched. Included files, other layers and binary files are not searched.
+A finding names an MJCF element by the tag and the name of the element, or a USD prim by its path. urdfkin
+searches for the element in the first 10 MB of the file, and adds the line of the element to the finding. In
+included files, other layers and binary files, urdfkin does not search for elements.
 """
 
 from __future__ import annotations
@@ -40,18 +40,17 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
 _MAX_SEARCHED_BYTES = 10_000_000
-#: Beginnings and ends of XML markup other than elements.
+#: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: MJCF elements that findings report by tag, without a name.
-#: Keys are tags in files. Values are tags in findings.
+#: MJCF elements that findings report by tag, without a name. Keys are tags in the file; values are tags in
+#: the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Matches the beginning of a USD prim, or a delimiter.
-#: Parentheses and braces are delimiters.
-#: Comments, strings, references and arrays begin with a delimiter.
+#: Regular expression for the beginning of a prim in a USD text file, or for a delimiter. Delimiters are
+#: parentheses, braces, and the beginnings of comments, strings, references and arrays.
 _PRIM_OR_DELIMITER = re.compile(
     rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]'''
 )
-#: Beginning and end of USD comments, arrays, strings and references.
+#: Maps the beginning of a USD comment, array, string or reference to a regular expression for its end.
 _SKIPPED_TEXT = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
@@ -59,8 +58,8 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Maps (tag, name) to a position (line, column, width).
-#: Lines and columns count from 1.
+#: Maps (tag, name) of an element or prim to (line, column, width) of its beginning. Lines and columns count
+#: from 1.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
@@ -130,10 +129,10 @@ def _find_positions(
 
 
 def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
-    """Yield tag, name and byte span of MJCF elements that findings can name.
+    """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
 
     An equality constraint without a name is identified by its index. After an `<include>`, the index is
-    unknown. Constraints without a name are then skipped.
+    unknown, so constraints without a name are skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
@@ -167,7 +166,7 @@ def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
 
 
 def _find_prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
-    """Yield "prim", path and byte span of each prim in a USD text."""
+    """Yield "prim", the path and the span (in bytes) of each prim in a USD text file."""
     above, prim, cursor, inside = list[str](), "", 0, 0
     while (found := _PRIM_OR_DELIMITER.search(data, cursor)) is not None:
         cursor, token = found.end(), found[0]
