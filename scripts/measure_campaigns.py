@@ -60,7 +60,7 @@ ENGINES: dict[str, Callable[..., ValidationReport]] = {
 
 
 def measure(robots: list[str], engines: list[str], samples: int, rounds: int) -> None:
-    validate("planar_two_link", samples=10)  # import all modules before the measurement
+    validate("planar_two_link", samples=400)  # import all modules and load all kernels before the measurement
     wall: dict[str, list[float]] = {name: [] for name in engines}
     processor: dict[str, list[float]] = {name: [] for name in engines}
     for name in engines * rounds:
