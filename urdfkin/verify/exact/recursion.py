@@ -126,7 +126,7 @@ def acceleration_values(motion: ExactMotion, link: int, reference: Reference) ->
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the spatial acceleration.
 
-    Linear part: acc - w x vel. For WORLD: acc - w x vel - alpha x p.
+    The linear part is acc - w x vel, or acc - w x vel - alpha x p for WORLD.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
@@ -148,7 +148,7 @@ def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -
 def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # NumPy has no product of an interval and an array.
+        # NumPy cannot multiply an interval by an array.
         out[of, by] += _as_array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
