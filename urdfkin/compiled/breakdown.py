@@ -57,7 +57,7 @@ _MAX_DISPLAYED_SAMPLES = 2
 class AccelerationBreakdown(Displayable):
     """Contributions of the joints to a frame's acceleration.
 
-    Six numbers are a classical acceleration [linear; angular], m/s^2 and rad/s^2.
+    The last axis of each array contains a classical acceleration [linear; angular], m/s^2 and rad/s^2.
 
     Attributes:
         joints: Moving joints from the base to the frame.

@@ -50,7 +50,7 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Results of at least this size (bytes) bypass the caches, because they would not fit.
+#: Results of at least this size (bytes) bypass the caches, because they would not fit into them.
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum size of a kernel's buffer. 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_DOUBLES = 3072

@@ -207,7 +207,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 class _Anchor(NamedTuple):
     """A link's pose relative to the last moving joint."""
 
-    step: int  # row of this joint in `CompiledTree.steps`; -1 if only fixed joints lead to the link
+    step: int  # Row of this joint in `CompiledTree.steps`; -1 if only fixed joints lead to the link.
     T: FloatArray
     length: float
 

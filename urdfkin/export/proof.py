@@ -238,7 +238,7 @@ def format_decimal(x: Number) -> str:
     Return "0.0" for an interval that contains 0, or if the midpoint rounds to the double 0.
     """
     ball = as_interval(x)
-    # C compilers warn about a decimal that rounds to 0.
+    # C compilers warn about a nonzero decimal that rounds to 0.
     if ball.contains(0) or float(ball) == 0.0:
         return "0.0"
     digits, e, exponent = ball.str(REFERENCE_DIGITS, radius=False).partition("e")

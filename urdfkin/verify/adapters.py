@@ -209,7 +209,7 @@ def read_mujoco(source: str) -> LibraryModel:
 
 
 def _split_mujoco_value(name: str, value: JointValue, names: list[str]) -> Iterator[tuple[str, JointValue]]:
-    """A planar joint is three joints in MuJoCo."""
+    """Yield the values of MuJoCo's joints, because a planar joint is three joints in MuJoCo."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR_SUFFIXES[0] in names:
@@ -467,7 +467,7 @@ def version(name: str) -> str | None:
 
 
 def evaluate_case(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """An exception of the library becomes the entry `error`."""
+    """Compute the poses of one case; an exception of the library becomes the entry `error`."""
     try:
         model = LIBRARIES[name].read(case["text"])
         found = [model.compute_poses(values) for values in case["configurations"]]

@@ -144,7 +144,7 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 
 
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """The bits equal those of `_fill_without_kernel`."""
+    """Write exactly the same doubles as `_fill_without_kernel`, with the kernel `lengths`."""
     joints = lengths.joints
     # If the stride is 0, all configurations share one row, and the kernel receives only this row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -165,7 +165,7 @@ def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArra
 
 
 def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
-    """Each column has length 1 or n."""
+    """Return an array of columns, each of which has length 1 or n."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -187,7 +187,7 @@ class _FrameEnd(NamedTuple):
 
     step: int  # Index of the last moving joint in `_Lengths.joints`, or -1 if there is none.
     frame: int
-    length: float  # m.
+    length: float  # Length of this part of the path, m.
 
 
 class _Lengths(NamedTuple):
@@ -219,7 +219,7 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _as_columns(x: FloatArray, n: int) -> Any:
-    """For n = 1, return Python numbers, which are faster than arrays."""
+    """Return the columns of x; for n = 1, return Python numbers, which are faster than arrays."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 

@@ -36,7 +36,10 @@ _ignore_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 def derive_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """`compute_bound` returns the bound on velocity Jacobians."""
+    """Return an oracle's analytical Jacobians, and a bound.
+
+    `compute_bound` returns the bound on velocity Jacobians.
+    """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     J_v = oracle.jacobians(x.query._replace(reference=aligned))
     magnitudes = library.adapt_magnitudes(compute_magnitudes(x.plan, x.q, None, None, x.state))

@@ -55,7 +55,7 @@ class MjcfReading:
 
     Attributes:
         remarks: Elements that the tree lacks.
-        path: None for MJCF text.
+        path: Path of the file, or None for MJCF text.
         answer: Last answer with a robot, from the process that reads the file.
         shapes_refusal: Reason why MuJoCo compiles the file only without shapes and inertias. None if MuJoCo
             compiles the complete file. Not valid with `with_check_data=False`.

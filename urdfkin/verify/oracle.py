@@ -571,12 +571,12 @@ class Oracle:
 
     Args:
         mimic: If False, mimic joints are independent joints.
-        moving_base: A free-flyer moves the root.
+        moving_base: Whether a free-flyer moves the root.
         root_joint: Kind of the root joint that is added to the joints of the text.
         lock: Values of locked joints, rad or m.
 
     Attributes:
-        new_data: Makes the data for one thread.
+        new_data: Function that makes the data for one thread.
     """
 
     title: ClassVar[str]

@@ -148,7 +148,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
 
 
 def sum_table_lengths(table: DHTable) -> float:
-    """Return the sum of all lengths, with base and tool, m."""
+    """Return the sum (m) of all lengths in a table, including its base and tool."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 

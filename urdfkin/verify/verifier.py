@@ -48,8 +48,7 @@ if TYPE_CHECKING:
 #: Number of random configurations in the check of a table, besides zero and limit configurations.
 TABLE_SAMPLES = 40
 
-#: True: check all results of a call. False: check none.
-#: "sample": check `SAMPLE_SIZE` configurations of a call.
+#: True checks all results of a call, False checks none, and "sample" checks `SAMPLE_SIZE` configurations.
 Verify = bool | Literal["sample"]
 
 SAMPLE_SIZE = 100
@@ -106,7 +105,10 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the robot's oracle. With `base`, the oracle's model has a free-flyer."""
+        """Return the robot's oracle.
+
+        If `base` is given, the oracle's model has a free-flyer.
+        """
         key = library.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = library.make_oracle(

@@ -85,7 +85,7 @@ _register_pass: Any = register_pass
 
 class _InlinedLibrary(_CodeLibrary):  # type: ignore[misc]
     def finalize(self) -> None:
-        """Complete the library without machine code."""
+        """Complete the library without generating machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -99,7 +99,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
     _name = "inlined_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Translate to LLVM code only."""
+        """Translate the function to LLVM code, but not to machine code."""
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)

@@ -109,7 +109,7 @@ def _clear_flag(context: Any, numbers: Any, index: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles; 0 for unsupported arrays.
+    """Return the address of the doubles, or 0 if the array is not supported.
 
     The array must have `axes` axes and the shape (rows, columns, columns, ...).
     """

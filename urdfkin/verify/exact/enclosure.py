@@ -50,7 +50,7 @@ class Enclosure:
 
     Attributes:
         urdfkin: urdfkin's result.
-        pinocchio: None if Pinocchio has no result.
+        pinocchio: Pinocchio's result, or None if Pinocchio has no result.
     """
 
     quantity: str
