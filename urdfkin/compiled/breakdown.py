@@ -6,9 +6,9 @@
 | w_{k-1} | angular velocity of link k-1 |
 | d | vector from the joint's origin to the frame's origin |
 
-For `Reference.WORLD`, the world's origin replaces the frame's origin in u_k and d. Otherwise, d sums the
-interorigin vectors after the joint (7.110). A difference of two world positions would lose digits. Examples
-are a robot far from the world's origin, and a long link.
+For `Reference.WORLD`, the world's origin replaces the frame's origin in u_k and d. For the other reference
+frames, d is the sum of the interorigin vectors after the joint (7.110). A difference of two positions in the
+world would lose digits if the robot is far from the world's origin or has a long link.
 
     u_k = v_k z x d    for a revolute joint
     u_k = v_k z        for a prismatic joint
@@ -23,9 +23,9 @@ sum of these terms over all joints:
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
 
-The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129.
-The translation axes of a planar or floating joint rotate. Such a joint has an additional Coriolis term:
-`o x s`. Here, s is the joint's linear velocity, and o is its angular velocity.
+The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
+planar or floating joint has an additional Coriolis term, because the joint's axes of translation rotate. The
+additional term is o x s for the linear velocity s and the angular velocity o of the joint.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Kinds of acceleration, in the order of `AccelerationBreakdown.terms`.
+#: Kinds of acceleration that a joint contributes, in the order of `AccelerationBreakdown.terms`.
 ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 _MAX_DISPLAYED_SAMPLES = 2
 
@@ -57,7 +57,7 @@ _MAX_DISPLAYED_SAMPLES = 2
 class AccelerationBreakdown(Displayable):
     """Contributions of the joints to a frame's acceleration.
 
-    Six numbers are a classical acceleration [linear; angular], m/s^2 and rad/s^2.
+    The last axis of each array contains a classical acceleration [linear; angular], m/s^2 and rad/s^2.
 
     Attributes:
         joints: Moving joints from the base to the frame.
@@ -150,7 +150,7 @@ def acceleration_breakdown(
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # Frames: all links on the path.
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # The frames are all links on the path.
     n = len(q)
     terms = np.empty((n, len(moving), len(ACCELERATION_KINDS), 6)) if out is None else out
     base_acceleration = np.empty((n, 6))
@@ -187,10 +187,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Write the joints' contributions to `terms`.
-
-    Return the base's contribution (n, 6).
-    """
+    """Write the joints' contributions to `terms`, and return the base's contribution (n, 6)."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -215,7 +212,7 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """Return world vectors (n, links, 3) from each link to the last link."""
+    """Return the vectors (n, links, 3) from each link to the last link, in world axes."""
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
@@ -277,10 +274,7 @@ def _relative_motion(joint: Joint, x: FloatArray, R: FloatArray) -> _RelativeMot
 
 
 def _base_acceleration(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point of the base (7.123).
-
-    `d` leads from the base's origin to the point.
-    """
+    """Return the acceleration of a point fixed to the base, at `d` from the base's origin (7.123)."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

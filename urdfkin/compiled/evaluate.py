@@ -1,8 +1,8 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs have the shapes (n, nq) and (n, nv). The functions of this module do not check the shapes. Python
-numbers compute small batches. Compiled kernels compute large batches. The module `preload` selects the
-method. Each method and any number of threads give exactly the same doubles.
+Inputs have the shapes (n, nq) and (n, nv). The functions of this module do not check the shapes. Small
+batches are computed with Python numbers, and large batches by a compiled kernel. The module `preload` decides
+when a kernel is used. Results are exactly the same doubles for each method and for any number of threads.
 
 | function | result | shape | equations |
 |---|---|---|---|
@@ -50,17 +50,16 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Minimum size of results that bypass the caches, bytes.
-#: Larger results do not fit into the caches.
+#: Results of at least this size (bytes) bypass the caches, because they would not fit into them.
 _MIN_BUFFERED_BYTES = 2 << 20
-#: 3072 doubles: 24 KiB, half of a 48 KiB L1 cache.
+#: Maximum size of a kernel's buffer. 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_DOUBLES = 3072
 
 _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
 
 
 class EvaluateOptions(TypedDict, total=False):
-    """Keyword arguments of batch functions such as `placements`.
+    """Keyword arguments of the functions that compute a batch, such as `placements`.
 
     Attributes:
         base: State of the base, (n, 24) or (1, 24).
@@ -160,7 +159,7 @@ def _compute(
 ) -> FloatArray:
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    # With the stride 0, all rows are the same memory.
+    # If an array has the stride 0, all its rows are the same memory, so the first row is enough.
     inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (invalid := _compute_interpreted(name, program, reference, inputs, out, threads)) is None:
         invalid = _compute_compiled(
@@ -179,10 +178,9 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch without a kernel.
+    """Compute a batch without a kernel; return None if a kernel must compute the batch.
 
-    Return None if a kernel must compute the batch. Otherwise, return 1 for nan, inf or too large inputs, else
-    0.
+    Otherwise, return 1 if an input is nan, inf or too large, else 0.
     """
     if preload.get_kernel(name) is not None:
         return None
@@ -196,7 +194,7 @@ def _compute_interpreted(
         row[:] = result
         least_seconds = min(least_seconds, seconds := time.thread_time() - start_time)
         preload.add_time(name, seconds)
-        # The first configuration takes longer, so wait for the second.
+        # The first configuration takes longer than later configurations, so its time is not representative.
         if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least_seconds) is not None:
             return None
     return invalid
@@ -273,10 +271,7 @@ def _base_may_overflow(base: FloatArray) -> bool:
 
 
 def check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error if a number is not finite.
-
-    An input raises NotFiniteError. A result raises RangeError.
-    """
+    """Raise NotFiniteError if an input is not finite, and RangeError if a result is not finite."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))
@@ -288,17 +283,15 @@ def check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Minimum batch size for several threads by default.
-#: Starting a thread takes about ten microseconds.
+#: Minimum size of a batch that uses several threads by default, because starting a thread takes about ten
+#: microseconds.
 _MIN_THREADED_ROWS = 4096
 
-#: Number of configurations that NumPy computes at a time.
-#: Intermediate results then fit into the cache.
+#: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
 ROWS_PER_PART = 2048
 
-#: (inputs, out) -> 1 for invalid inputs, else 0.
-#: Invalid: nan, inf or too large.
-#: The function computes the rows of `out`.
+#: A function that computes rows of `out` from rows of `inputs`. The function returns 1 for nan, inf or too
+#: large inputs, else 0.
 BlockFunction = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -341,7 +334,7 @@ def compute_in_threads(
 def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows in parts to limit memory.
 
-    For n = 0, `compute` is called once with an empty slice.
+    If n is 0, the function calls `compute` once, with an empty slice.
     """
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
     parts = [slice(i, min(i + ROWS_PER_PART, n)) for i in range(0, max(n, 1), ROWS_PER_PART)]
@@ -355,7 +348,7 @@ def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | No
     if len(parts_by_thread) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, thread_parts) for thread_parts in parts_by_thread]
-    wait(work)  # All threads finish before an error is raised.
+    wait(work)  # All threads finish writing before an error is raised.
     for future in work:
         future.result()
     return None

@@ -1,4 +1,4 @@
-"""Find the cache folder of compiled kernels, and report compilations.
+"""Find the cache folder of compiled kernels, and report when a compilation begins and ends.
 
 This module does not import Numba.
 """
@@ -18,15 +18,14 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
-#: Lock for the import of Numba and for compilations.
-#: A fork waits: a child cannot finish the parent's compilation.
-#: Import of Numba: this lock first, then `logging`'s lock.
-#: A fork acquires the newest lock first.
-#: So `logging` must be imported before this lock is created.
+#: Lock for the import of Numba and for compilations. A fork waits for this lock, because a child cannot
+#: finish the parent's compilation. The import of Numba acquires this lock first, and then `logging`'s lock. A
+#: fork acquires the newest lock first. Both orders are the same only if this lock is newer, so `logging` must
+#: be imported before this lock is created.
 compile_lock = make_fork_safe_lock()
 
-#: (kernel name, None): a compilation begins.
-#: (kernel name, seconds): the compilation has ended.
+#: A function that receives a kernel's name and the compile time in seconds. The time is None when the
+#: compilation begins.
 Listener = Callable[[str, float | None], None]
 
 

@@ -1,7 +1,7 @@
-"""Outputs of the forward recursion: placements, velocities, Jacobians and others.
+"""Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-The functions `state_for_...` replace unneeded vectors of a state by `unused()`. Jacobian columns are computed
-in world axes. For LOCAL, the columns are then rotated to the frame's axes.
+The functions `state_for_...` replace unneeded vectors of a link's state by `unused()`. Jacobian columns are
+computed in world axes. For LOCAL, the columns are then rotated to the frame's axes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: Scratch rows of a pose (16) and a six-vector (6).
+#: Scratch row of each element of a pose (16), and of each number of a velocity or acceleration (6).
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -45,10 +45,7 @@ def state_for_velocity(state):
 
 
 def state_for_acceleration(state):
-    """Mark the linear velocity as unused.
-
-    Accelerations do not depend on the linear velocity (7.129, 7.130).
-    """
+    """Mark the linear velocity as unused, because no acceleration depends on it (7.129, 7.130)."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -76,7 +73,7 @@ def _store_pose_row(scratch, row, x, last):
 def write_velocity(m, scratch, program, frame, sources, start, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
     if reference == _WORLD:
-        # Velocity of the body point at the world's origin.
+        # The result is the velocity of the body point that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
     _write_six_vector(m, scratch, program, frame, start, vel, w, to)
 
@@ -171,9 +168,9 @@ def write_jacobian_rate_column(scratch, row, to, flags, constants, multiplier_in
 
 
 def _reference_point(reference, x):
-    """For WORLD, return 0 instead of a frame's origin or velocity `x`.
+    """For WORLD, return 0 instead of `x`, because the world's origin is fixed at 0.
 
-    The world's origin has the position 0 and the velocity 0.
+    `x` is the frame's origin or its velocity.
     """
     if reference == _WORLD:
         nil = broadcast(0.0)
@@ -218,7 +215,7 @@ def write_hessian(m, scratch, program, frame, sources, start, reference, state, 
             store_vector(scratch, program[j + 3], _zero_vector())
             store_vector(scratch, program[j + 3] + 3, _zero_vector())
         for i in range(first, end, HESSIAN_COLUMN_WIDTH):
-            if program[i + 2] == rate:  # A mimic joint has the mimicked joint's index.
+            if program[i + 2] == rate:  # Mimic joints have the velocity index of the mimicked joint.
                 _add_column_derivatives(scratch, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -226,7 +223,7 @@ def write_hessian(m, scratch, program, frame, sources, start, reference, state, 
 
 
 def _add_column_derivatives(scratch, program, i, first, end, reference):
-    """Add the derivatives of column i with respect to the joint motions.
+    """Add the derivatives of column i with respect to each joint's motion.
 
     The joint of column i counts as an earlier joint.
 

@@ -1,9 +1,9 @@
-"""Convert a robot's tree to arrays and to kernel programs.
+"""Convert a robot's tree to arrays, and to a program for the kernels.
 
-A program is a list of instructions that a kernel executes. A moving joint is called a step. The joint frames
-are rotated. The joint's axis is then z, as in the textbook. A revolute joint rotates about z. A prismatic
-joint translates along z. Fixed joints are merged into the constant offsets between moving joints. Where the
-tree branches, a program saves a link's state to memory.
+A program is a list of instructions that a kernel executes. A moving joint is called a step. As in the
+textbook, every joint frame is rotated so that the joint's axis is z. A revolute joint then rotates about z,
+and a prismatic joint translates along z. Fixed joints are merged into the constant offsets between moving
+joints. At a branch of the tree, a program saves the state of a link to memory.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Geometry(IntEnum):
     """First column of each quantity in `CompiledTree.geometry`.
 
     Attributes:
-        R: Rotation from this joint's axes to the previous moving joint's axes, row by row.
+        R: Rotation matrix from this joint's axes to the previous moving joint's axes, row by row.
         OFFSET: Vector from the previous moving joint to this joint, in the previous joint's axes.
         MULTIPLIER: Multiplier of the mimic rule; 1 without a rule.
         CONSTANT: Offset of the mimic rule; 0 without a rule.
@@ -69,8 +69,7 @@ _MOTION_OF_KIND = {
     JointKind.FLOATING: JointMotion.FLOATING,
 }
 
-#: Motions (axis, is_rotation) of each joint kind.
-#: Axes 0, 1, 2: x, y, z of the joint frame.
+#: Motions (axis, is_rotation) of each kind of joint. The axes 0, 1 and 2 are x, y and z of the joint's frame.
 _AXIS_MOTIONS: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
@@ -102,8 +101,8 @@ class CompiledTree:
     | tilts | (frames,) | sum of `Joint.pinocchio_tilt` (rad) over these URDF joints, in output order |
 
     In `target_columns`, joints with the same index in v share the column of the first joint on the path. An
-    element of `lengths` is a sum of `Joint.length`. The sum begins after the previous moving joint, or after
-    the base. Fixed joints count too.
+    element of `lengths` is the sum of `Joint.length` over the joints after the previous moving joint, or
+    after the base. Fixed joints count too.
     """
 
     nq: int
@@ -208,7 +207,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 class _Anchor(NamedTuple):
     """A link's pose relative to the last moving joint."""
 
-    step: int  # row of this joint in `CompiledTree.steps`; -1 for none
+    step: int  # Row of this joint in `CompiledTree.steps`; -1 if only fixed joints lead to the link.
     T: FloatArray
     length: float
 
@@ -334,28 +333,24 @@ class ProgramHeader(IntEnum):
     BASE = 12
 
 
-#: A row of scratch memory: eight configurations, one double each.
-#: A row fills an AVX-512 register or two AVX2 registers.
+#: Number of configurations that a kernel computes at a time. A row of scratch memory contains one double of
+#: each configuration, so it fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Instruction: operation, three operands, index of the first constant.
+#: Number of integers of an instruction: the operation, three operands, and the index of the first constant.
 INSTRUCTION_WIDTH = 5
-#: Number of integers per joint angle in a program.
-#: Integer 0: scratch row of the coordinate q.
-#: Integer 1: scratch row of the sine; next row: cosine.
-#: Integer 2: index of the mimic rule's constants.
-#: Integer 3: whether the joint has a mimic rule (1 or 0).
+#: Number of integers that describe a joint angle in a program. Integer 0 is the scratch row of the coordinate
+#: q. Integer 1 is the scratch row of the sine. The next row contains the cosine. Integer 2 is the index of
+#: the mimic rule's constants. Integer 3 is 0 if the angle is q, and 1 if the angle is multiplier * q +
+#: offset.
 ANGLE_WIDTH = 4
-#: Scratch rows 0 and 1: the numbers 0 and 1.
-#: Rows 2 to 17: results of a frame. Row 18: joint angle.
-#: Rows from 19: all other numbers.
+#: Row 0 of scratch memory contains the number 0, and row 1 the number 1. Rows 2 to 17 contain a frame's
+#: results, and row 18 contains a joint angle. The rows from 19 contain all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers per Jacobian column, for a Hessian.
-#: Integer 0: first scratch row of the column.
-#: Integer 1: row of the joint in `steps`.
-#: Integer 2: index of the joint in v.
-#: Integer 3: first of six scratch rows (sums of derivatives).
-#: The derivatives are with respect to the joint's motion.
+#: Number of integers that describe a Jacobian column, if a program computes a Hessian. Integer 0 is the first
+#: scratch row of the column. Integer 1 is the joint's row in `steps`. Integer 2 is the joint's index in v.
+#: Integer 3 is the first of six scratch rows. These rows contain sums of derivatives with respect to the
+#: joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINT_OPS = {
@@ -381,10 +376,7 @@ class KernelProgram:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Memory addresses of `words` and `constants`.
-
-        The addresses are valid as long as this object exists.
-        """
+        """Memory addresses of `words` and `constants`, valid as long as this object exists."""
         return address(self.words), address(self.constants)
 
     @cached_property
@@ -398,8 +390,8 @@ def compile_program(
 ) -> KernelProgram:
     """Return the program for a tree's frames.
 
-    Placements and results in frame axes need `orientations`. With `hessian`, mimic joints have separate
-    columns.
+    `orientations` must be true for placements and for results in frame axes. If `hessian` is true, each mimic
+    joint has a separate column.
     """
     key = orientations, columns, hessian
     program: KernelProgram | None = plan.cache.get(key)
@@ -461,7 +453,7 @@ class _ProgramWriter:
                     c += 1
                 self._save_if_reused(step, last, k + 1)
             elif frame is not None and self._add_frame(frame):
-                now = -2  # The registers contain the frame's state, not a joint's state.
+                now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _joints_and_frames(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield the joints and the frames in the order of the recursion.
@@ -478,9 +470,10 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state of `step` if a later instruction needs this state.
+        """Save the state of `step` to memory if a later instruction needs this state.
 
-        The next joint or frame (index `following`) finds the state in the registers.
+        The next joint or frame, with the index `following`, does not need the memory, because the state is
+        still in the registers.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
@@ -559,7 +552,7 @@ class _ProgramWriter:
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
     def _result_rows(self, f: int, row: int) -> list[int]:
-        """Return the scratch rows of the (6, nv) matrix, in C order."""
+        """Return the scratch row of each entry of the (6, nv) matrix, in C order."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.target_columns[f] == np.arange(len(plan.columns))):
@@ -582,17 +575,13 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _needed_block_starts(indices: Sequence[int]) -> list[int]:
-    """Return the starts of the needed blocks of eight.
-
-    For example, the indices [3, 5, 12] give [0, 8].
-    """
+    """Return the starts of the needed blocks of eight, for example [0, 8] for the indices [3, 5, 12]."""
     return sorted({int(index) // 8 * 8 for index in indices})
 
 
-#: Size (bytes) of a cache line.
-#: A vector in two lines takes twice the access time.
+#: Size (bytes) of a cache line. Access to a vector in two lines takes twice as long as in one line.
 _CACHE_LINE = 64
-#: {reference frame: integer for kernels}.
+#: The integer that represents each reference frame in a kernel.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
@@ -612,11 +601,10 @@ class KernelArgs(IntEnum):
     Q = auto()
     V = auto()
     A = auto()
-    #: Address of the base's state (rows of 24 numbers).
-    #: 0: a fixed base at the world's origin.
+    #: Address of the base's state (rows of 24 numbers). The address is 0 for a fixed base at the world's
+    #: origin.
     BASE = auto()
-    #: Stride between consecutive configurations, doubles.
-    #: 0: all configurations use the same row.
+    #: Stride (doubles) between consecutive configurations; 0 if all configurations use the same row.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -624,7 +612,7 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     OUTPUT_WIDTH = auto()
-    #: Address of the buffer for block results; 0 for none.
+    #: Address of the buffer for a block's results; 0 without a buffer.
     BUFFER = auto()
 
     KERNEL = auto()
@@ -639,7 +627,7 @@ class KernelArgs(IntEnum):
 
 
 def address(x: NDArray[Any]) -> int:
-    first: int = x.__array_interface__["data"][0]  # `x.ctypes.data` is slower: it runs Python code.
+    first: int = x.__array_interface__["data"][0]  # `x.ctypes.data` is slower, because it runs Python code.
     return first
 
 

@@ -1,8 +1,8 @@
 """Decide when a kernel is loaded or compiled.
 
-Numba is imported only when a kernel is loaded or compiled. For a few configurations, plain Python is faster
-than loading a kernel. This module therefore sums up each kernel's time (s) in plain Python. The sum includes
-the estimated time of the next computations. At each threshold, the module takes an action:
+Numba is imported only when a kernel is loaded or compiled. For a few configurations, plain Python takes less
+time than loading or compiling a kernel. For each kernel, this module therefore sums up the time (s) of plain
+Python, including the estimated time of the next computations. At each threshold, the module takes an action:
 
 | time in plain Python | action |
 |---|---|
@@ -30,23 +30,23 @@ from urdfkin.system.locks import import_lock
 if TYPE_CHECKING:
     import subprocess
 
-#: Thresholds (s) of the table in the module's docstring.
+#: Thresholds (s) of the time in plain Python; see the module's docstring.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: Threshold (s) instead of `LOAD_AFTER`, for all later kernels.
+#: Threshold (s) that replaces `LOAD_AFTER` after the first kernel has been loaded.
 _LOAD_NEXT_AFTER = 0.03
-#: Time (s) that one call of a fast function saves.
+#: Time (s) that the fast function saves in each call with one configuration.
 _SECONDS_SAVED_PER_CALL = 5e-5
-#: Interval (s) between searches for a missing kernel.
+#: Time (s) after which the cache folder is searched again for a missing kernel.
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two processes compile one group each, in about equal times.
+#: Two groups of kernels with about equal compile times, one for each of two processes.
 _FIRST_PROCESS_KERNELS = "accelerations", "local_accelerations", "velocities"
 _SECOND_PROCESS_KERNELS = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
-#: "interpreted": Python numbers. "compiled": kernels.
+#: How to compute: "interpreted" with Python numbers, or "compiled" with kernels.
 ComputeMode = Literal["interpreted", "compiled"]
 
 _seconds_spent: dict[str, float] = {}
@@ -93,10 +93,9 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 
 
 def should_load_single_evaluator(name: str) -> bool:
-    """Return whether to use the kernel `one_configuration`.
+    """Return whether to use the kernel `one_configuration`, and load the kernel if it saves time.
 
-    A kernel that saves time is loaded. Without a selected mode, the result is False before a batch kernel of
-    `name` is loaded.
+    Without a selected mode, the result is False until a batch kernel of the quantity `name` is loaded.
     """
     if _modes:
         return _modes[-1] == "compiled"
@@ -127,8 +126,8 @@ def _is_on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: The second process ends when its standard input closes.
-#: The input closes when the first process ends.
+#: Python code that ends the second process when its standard input closes. The standard input closes when the
+#: first process ends.
 _EXIT_WITH_PARENT_CODE = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
@@ -141,7 +140,7 @@ def _compile_in_background(name: str, module: str) -> bool:
     if kernel_cache_folder() is None:
         return False
     if not compile_lock.acquire(blocking=False):
-        return True  # Another thread compiles a kernel or starts the second process.
+        return True  # Another thread is compiling a kernel or starting the second process.
     try:
         if any(process.poll() is None for process in _background.values()):
             return True
@@ -181,10 +180,7 @@ def _close_stdin(process: subprocess.Popen[bytes]) -> None:
 
 
 def _close_inherited_inputs() -> None:
-    """Close a forked child's copy of the pipe.
-
-    Otherwise, the second process would not end with its parent.
-    """
+    """Close a forked child's copy of the pipe, so that the second process ends when its parent ends."""
     for process in _background.values():
         process.returncode = 0
         _close_stdin(process)

@@ -1,7 +1,7 @@
-"""Fast results for control loops and solvers: one frame, one configuration.
+"""Fast results of one frame for one configuration, for control loops and solvers.
 
-Each fast function has scratch memory for one thread. Two threads may call the function at the same time. Then
-a method of `Robot` computes the second result.
+Each fast function has scratch memory for one thread. If two threads call the function at the same time, the
+methods of `Robot` compute the result of the second call.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import import_lock
 
-#: f(q, out), f(q, v, out) or f(q, v, a, out).
-#: Unsupported arguments give None.
+#: A function f(q, out), f(q, v, out) or f(q, v, a, out). The function returns None for unsupported arguments.
 FastFunction = Callable[..., FloatArray | None]
 
 
@@ -93,10 +92,9 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether the first call loads or compiles machine code.
-        #: `Robot.prepare` sets True.
+        #: Whether the first call loads or compiles machine code; `Robot.prepare` sets True.
         self.always_load = False
-        # `_compute_first` replaces itself by the fast function.
+        # `_compute_first` replaces the attribute of its quantity by the fast function.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -104,8 +102,8 @@ class PreparedFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # Fast functions contain memory addresses of this process.
-        # So unpickling calls `Robot.prepare`.
+        # The fast functions contain memory addresses that are valid only in this process. Unpickling
+        # therefore makes a new object with `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
     def placement(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:

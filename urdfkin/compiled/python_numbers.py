@@ -11,16 +11,16 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: L: this number. Inputs, lengths and multipliers are below L.
-#: With a mimic multiplier, velocity and displacement are below L^2.
-#: N joints: angular velocity w, path length d < N L^2.
-#: Largest product: w^2 d < N^3 L^6. No result overflows.
+#: Let L be this number. No result overflows if coordinates, velocities, lengths and multipliers are below L.
+#: A mimic joint multiplies a velocity or a displacement by its multiplier, so both are below L^2. For N
+#: joints, an angular velocity w and a path length d are therefore below N L^2. The largest product is w^2 d,
+#: which is below N^3 L^6.
 NO_OVERFLOW_BOUND = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _TWO_OVER_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: x + ROUNDING_SHIFT rounds x to an integer (|x| < 2^51).
-#: The lowest bits of the mantissa contain the integer.
+#: Adding this constant rounds a number between -2^51 and 2^51 to an integer. The sum's mantissa contains the
+#: integer in its lowest bits.
 ROUNDING_SHIFT = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -49,10 +49,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
 def _fma_without_errors(
     own: Callable[..., float], c: Callable[..., float]
 ) -> Callable[[float, float, float], float]:
-    """Return a fused multiply-add without errors.
-
-    If the result is inf or nan, `math.fma` raises an error. The returned function returns inf or nan.
-    """
+    """Return a fused multiply-add that returns inf or nan where `math.fma` raises an error."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -183,10 +180,7 @@ class ConstantNumber:
 
 
 def _double(x: Any) -> float:
-    """Convert a number to a float.
-
-    The number must not be `unused()`.
-    """
+    """Convert a number to a float; the number must not be `unused()`."""
     if type(x) is Product:
         return x.x * x.y
     return x.x if type(x) is Number else float((x.value or 0) if type(x) is ConstantNumber else x)
@@ -231,7 +225,7 @@ def load_constant(constants: Sequence[Number], i: int) -> Number:
     return constants[i]
 
 
-broadcast = Number  # The compiled `broadcast` fills all eight lanes of a vector.
+broadcast = Number  # The compiled `broadcast` copies a double to all eight lanes of a vector.
 
 
 def array_data(array: Any) -> Any:
@@ -239,10 +233,7 @@ def array_data(array: Any) -> Any:
 
 
 def doubles_at(address: Any) -> Any:
-    """Return the list `address`.
-
-    The compiled function converts an address to a pointer.
-    """
+    """Return the list `address`; the compiled function converts an address to a pointer."""
     return address
 
 

@@ -1,6 +1,4 @@
-"""The forward recursion of section 7.7 for a block of configurations.
-
-The recursion goes link by link, from the base outwards.
+"""The forward recursion of section 7.7 for a block of configurations: link by link, from the base outwards.
 
 The state of a link consists of:
 
@@ -10,8 +8,8 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-The textbook uses world axes. The rotation R converts components in link axes to components in world axes. The
-joint axis and the interorigin vector have constant components in the link's axes.
+The textbook uses world axes. The rotation R of a link converts components in the link's axes to components in
+world axes. The joint axis and the interorigin vector have constant components in the link's axes.
 
 | `axes` | joint axis and interorigin vector | velocities and accelerations of the previous link |
 |---|---|---|
@@ -21,9 +19,9 @@ joint axis and the interorigin vector have constant components in the link's axe
 For velocities and accelerations, the recursion uses the axes of the requested reference frame. A rotation of
 the final result would add rounding errors. For Jacobians, the recursion uses world axes.
 
-The placeholder `unused()` replaces each unneeded vector. Kernels contain no code for operations with the
-placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions. The number types of the
-copies are in `urdfkin.compiled.machine.numbers`.
+The placeholder `unused()` replaces each vector that a result does not need. Kernels contain no code for
+operations with the placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions with
+the number types of `urdfkin.compiled.machine.numbers`.
 """
 
 from __future__ import annotations
@@ -150,7 +148,7 @@ def rotate_frame(axes, state, S):
 def _rotate_about_z(axes, state, scratch, row):
     """Rotate about z (7.5).
 
-    Scratch row `row` contains the sine. The next row contains the cosine.
+    Scratch row `row` contains the sine, and the next row contains the cosine.
     """
     return rotate_frame(
         axes, state, eq.about_z(load_number(scratch, row), load_number(scratch, row + 1), zero(), one())
@@ -195,7 +193,7 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
 
 
 def _joint_coordinate(scratch, row, constants, rule, is_mimic):
-    """Round the product and the sum of a mimic rule separately, like Pinocchio."""
+    """Round the product and the sum of a mimic rule separately, as Pinocchio does."""
     x = load_number(scratch, row)
     if is_mimic:
         x = round_product(load_constant(constants, rule) * x) + load_constant(constants, rule + 1)
@@ -319,10 +317,10 @@ def _restore_state(scratch, row, state):
 
 
 def _read_blocks(m, x, n, start, width, stride, blocks, begin, end, scratch, row):
-    """Read whole blocks of eight numbers.
+    """Read whole blocks of eight numbers, because this is faster than reading single numbers.
 
-    Whole blocks are faster. Surplus numbers go to the scratch rows of the next input. The next input, if
-    needed, is read later.
+    Surplus numbers are written to the scratch rows of the next input. If the next input is needed, it is read
+    later and replaces the surplus numbers.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -355,10 +353,7 @@ def _base_state(axes, m, scratch, args, row, start):
 
 
 def _sines_and_cosines(scratch, program, constants):
-    """Compute all sines and cosines.
-
-    The sines come first, because the recursion needs all registers.
-    """
+    """Compute all sines and cosines first, because the recursion needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _joint_coordinate(scratch, program[i], constants, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(scratch, ANGLE_ROW, angle)
@@ -480,7 +475,7 @@ def _compute_block(
     at, buffer = program[_CODE], args[_BUFFER]
     to, first = (doubles_at(buffer), 0) if buffer else (doubles_at(args[_OUT]), start)
     if args[_BASE] == 0 and _TRANSLATE_X <= program[at] <= _TRANSLATE:
-        # Base at rest: a translation changes only the position.
+        # The base is at rest, so a translation from the base changes only the position.
         state = _shift_position(state, _constant_vector(constants, program[at + 4]))
         at += INSTRUCTION_WIDTH
     while program[at] != _END:
@@ -510,8 +505,8 @@ def _compute_block(
 def forward_recursion(address, axes, orders, state_for_output, store_axis, write_column, write_frame):
     """Execute a program for every block of configurations.
 
-    `orders` is the number of inputs: 1 (q), 2 (q, v) or 3 (q, v, a). Return 1 for nan, inf or too large
-    inputs, else 0.
+    `orders` is the number of inputs: 1 (q), 2 (q, v) or 3 (q, v, a). Return 1 if an input is nan, inf or too
+    large, else 0.
     """
     args = integers_at(address)
     program, constants, scratch = (

@@ -4,8 +4,8 @@ The equations are 7.77 (positions of frames), 7.127 and 7.128 (velocities), 7.12
 7.85 (Jacobians) and 7.126 (Jacobian rates). Functions `local_...` compute in each frame's own axes.
 
 `urdfkin.compiled.machine.kernels` compiles a copy of each function. The copy is called a kernel. The argument
-is the address of integers; see `KernelArgs`. Python code passes lists instead of addresses. The result is 1
-for nan, infinite or too large inputs, else 0.
+of a kernel is the address of the integers that `KernelArgs` describes. Python code passes lists instead of
+addresses. The result is 1 if an input is nan, infinite or too large, else 0.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Export the kinematics of a robot's frame as code.
+"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains a self-test.
 
-The code runs without urdfkin, and contains a self-test. A LaTeX document contains only the formulas.
+A LaTeX document contains the formulas, but no self-test.
 """
 
 from __future__ import annotations
@@ -44,8 +44,9 @@ def code_for_language(code: FrameCode, to: str) -> FrameCode:
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """Return an exported file's text with its digest.
 
-    `file`, for example `arm.c`, replaces the default file name in the text. Only ASCII letters, digits, "_",
-    "." and "-" are allowed in `file`. Otherwise, the text keeps the default name.
+    `file`, for example `arm.c`, replaces the default file name in the text. The text keeps the default name
+    if `file` begins with "." or "-", or contains a character other than ASCII letters, digits, "_", "." and
+    "-".
 
     Raises:
         UnknownNameError: `to` is not a key of `LANGUAGES`.

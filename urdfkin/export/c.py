@@ -1,4 +1,4 @@
-"""Write C99 code in double or single precision, also for batches.
+"""Write C99 code in double or single precision, for one configuration and for batches.
 
 The exported code allocates no memory and has no global variables. Each function is straight-line code for one
 configuration, or for `LANES` configurations. Consecutive numbers of one configuration are `L` elements apart:
@@ -144,7 +144,7 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def min_configuration_count(code: FrameCode, function: Function) -> int:
-    """Return the least batch size with eight numbers in every non-empty array."""
+    """Return the least number of configurations with at least eight numbers in every non-empty array."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
@@ -156,7 +156,8 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 class InputLayout:
     """Layout of the C array `in`.
 
-    The order is: other inputs, input angles, computed angles, sines, cosines.
+    The order is: inputs that are not angles, input angles, computed angles, sines of all angles, cosines of
+    all angles.
     """
 
     def __init__(self, function: Function) -> None:

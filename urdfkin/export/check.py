@@ -1,10 +1,11 @@
-"""Run the test vectors of an exported file, and check its seal.
+"""Run the test vectors of an exported file, and check that the file is unchanged.
 
 The line "Seal" in the header contains a checksum of the file's text. The checksum does not prove who wrote
 the file.
 
-The check runs the file as code. Check only files from people that you trust. The check runs a copy of the
-file in a separate folder. In its own folder, the file could import a wrong `math.py`.
+The check runs the file as code, so check only files from people that you trust. The check runs a copy of the
+file in a separate folder. In the original folder, the file could by accident import another file, for example
+a `math.py`.
 """
 
 from __future__ import annotations
@@ -40,13 +41,13 @@ _COMPILE_COMMANDS = {
         ("c++", "-std=c++11", "-x", "c++", *_STRICT_FLAGS),
     ),
 }
-#: Compiler and options for CUDA, with nvcc and a GPU.
+#: Compiler and options for CUDA if the computer has nvcc and a GPU.
 _GPU_COMPILE_COMMAND = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters in the header of a file.
-#: The header contains `EXPORT_MARK`, and possibly the word UNVERIFIED.
+#: Number of characters at the start of a file that are searched for `EXPORT_MARK` and for the word
+#: UNVERIFIED.
 _HEADER_LENGTH = 2000
-#: Time limit (s) of a compiler or a test program.
-#: Code with a thousand joints compiles in one minute.
+#: Time limit (s) of a compiler or a test program. The code of a robot with a thousand joints compiles in one
+#: minute.
 _TIME_LIMIT = 600.0
 
 
@@ -56,7 +57,7 @@ def insert_seal(text: str) -> str:
 
 
 def _has_valid_seal(text: str) -> bool | None:
-    """Return whether the digest is correct, or None without a digest."""
+    """Return whether the digest is correct, or None if the text has no digest."""
     if (found := _SEAL_LINE.search(text)) is None:
         return None
     return _digest(_SEAL_LINE.sub(lambda line: line[1] + _DIGEST_PLACEHOLDER, text, count=1)) == found[2]
@@ -126,7 +127,7 @@ def _has_gpu() -> bool:
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
     """Run the test vectors in double and single precision.
 
-    The check of GPU functions needs nvcc and a GPU.
+    The check of a CUDA file includes the GPU functions only if nvcc and a GPU are available.
     """
     name, suffix = _find_program_name(_MAIN_MACRO, text, file), file.suffix.lower()
     copy = _copy(text, folder / f"checked{suffix}")

@@ -30,7 +30,8 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame.
 
-    All names are escaped, so no name can end a comment.
+    The names of the robot, the frame, the coordinates and the joints are escaped, so no name can end a
+    comment.
 
     Attributes:
         identifiers: Lists of names in the code. The keys are "q" (coordinates), "v" and "a" (velocities), and
@@ -189,7 +190,7 @@ def _parse_quantities(names: Collection[str]) -> list[Quantity]:
 class Writer:
     """Writes expressions as code.
 
-    If `sine` is False, the code reads sines and cosines from its inputs.
+    If `sine` is False, the code reads sines and cosines from its inputs instead of computing them.
     """
 
     def __init__(
@@ -267,7 +268,6 @@ def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) ->
         own, result = _SIGN, f"-{text(x.operands[0], _PRODUCT)}"
     else:
         own = _PRECEDENCE[x.op]
-        # The order of operations was compared with Pinocchio.
-        # Brackets, as in a + (b + c), keep this order.
+        # Brackets as in a + (b + c) keep the order of operations that was compared with Pinocchio.
         result = f"{text(x.operands[0], own)} {x.op} {text(x.operands[1], own + 1)}"
     return result if own >= precedence else f"({result})"

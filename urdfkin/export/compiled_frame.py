@@ -1,12 +1,12 @@
-"""Compile the kinematics of one frame to machine code.
+"""Compile the kinematics of one frame to machine code, the fastest way to compute in urdfkin.
 
-Machine code is the fastest way to compute in urdfkin. The first computation of a quantity compiles exported
-C code. The results of this code are compared with Pinocchio. Without a C compiler, urdfkin uses the forward
-recursion, which Numba compiles.
+The first call of a quantity compiles exported C code with the system's compiler, and compares the results
+with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
-A cache stores the machine code with checksums. The key contains the C code, compiler, options and processor.
-On Linux, urdfkin loads the code from memory. No other program can then change the code after the checksum
-test. On other systems, urdfkin loads the code from a temporary file.
+A cache stores the machine code with checksums. The key consists of the C code, the compiler's version and
+options, and the processor's features. On Linux, urdfkin loads the code from memory, so that no other program
+can change the code after the test of the checksum. On other systems, urdfkin loads the code from a temporary
+file.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: By default, GCC often uses only half a vector register.
+#: By default, GCC uses only half the width of 512-bit vector registers on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _load_counter = count()
@@ -60,8 +60,8 @@ class NoCompilerError(Exception):
 def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile one function, and load the library.
 
-    The library contains a function `task`. The argument of `task` is an array with the fields of
-    `KernelArgs`. `task` returns 1 if an input is not finite or too large. Otherwise, `task` returns 0.
+    The library contains a function `task`. Its argument is an array with the fields of `KernelArgs`. The
+    function returns 1 if an input is not finite or too large, else 0.
 
     Raises:
         NoCompilerError: no C compiler is installed, or the compiler rejects the code.
@@ -147,9 +147,9 @@ def _load_code(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its path.
-        # The path contains the file descriptor, which can occur again.
-        # Therefore, each path has a different number of "./".
+        # The loader identifies a library by the library's path, which contains the file descriptor. After
+        # this file is closed, the next library can have the same file descriptor. Therefore, each path
+        # contains a different number of "./".
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
@@ -163,7 +163,7 @@ def _compiler_version(compiler: str) -> str:
 
 @cache
 def _processor_features() -> str:
-    """Return the processor's features. They determine the result of `-march=native`."""
+    """Return the processor's features, on which the machine code of `-march=native` depends."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -171,8 +171,8 @@ def _processor_features() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results of a function.
-#: Eight configurations then need half a megabyte of stack.
+#: Maximum number of results of a function. With this number of results, eight configurations need half a
+#: megabyte of stack.
 _MAX_RESULTS = 8192
 # Plain integers are faster than members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
@@ -207,9 +207,9 @@ class _ExportedRobot(Protocol):
 class CompiledFrame:
     """Compiled functions for one robot frame: the result of `Robot.compile`.
 
-    Results agree with the results of `Robot` within the error bound, but not to the last bit. A batch and a
-    single call give exactly the same result. A wrong shape and a number that is not finite raise InputError.
-    The machine code is compared with Pinocchio once, on more than a hundred configurations.
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
+    has exactly the same result in a batch and in a single call. A wrong shape and a number that is not finite
+    raise InputError. The machine code is compared with Pinocchio once, on more than a hundred configurations.
     After `load(verify=False)`, this comparison is omitted. `Robot.certificate` always counts the results of a
     `CompiledFrame` as unchecked.
 
@@ -229,7 +229,7 @@ class CompiledFrame:
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._machine_codes: dict[str, Callable[[int], int] | None] = {}
-        # The first call compiles the code, or reads the cache.
+        # The first call of each function compiles the machine code, or reads the code from the cache.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -238,8 +238,7 @@ class CompiledFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # Memory addresses are not valid in another process.
-        # Therefore, unpickling creates a new object.
+        # Memory addresses are not valid in another process, so unpickling creates a new object.
         return self._robot.compile, (self.frame, self.reference)
 
     def placement(
@@ -351,7 +350,7 @@ class CompiledFrame:
         with compile_lock, import_lock:
             from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
-        # The fast function checks neither quaternion norms nor result ranges.
+        # The fast function checks neither the norm of a quaternion nor the range of the results.
         needs_checks = self._tree.floating_joints or self._plan.may_overflow
         if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
@@ -401,8 +400,8 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # After a NotFiniteError, the code below checks the inputs again.
-            # The second check names the coordinate that is not finite.
+            # After a NotFiniteError, the code below checks the inputs again, so that the error message names
+            # the coordinate that is not finite.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
@@ -419,7 +418,7 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether the machine code can use all arguments without conversion.
 
-        In a large batch, converting the arguments takes 10 % of the time.
+        In a large batch, the conversion of the arguments takes 10 % of the time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.may_overflow) and _is_plain(
@@ -445,8 +444,8 @@ class CompiledFrame:
         def compute_block(block_inputs: Sequence[FloatArray], block_out: FloatArray) -> int:
             arguments = _ArgumentArray()
             arguments[_N], arguments[_OUT] = len(block_out), address(block_out)
-            # The code writes eight numbers at once.
-            # Up to seven numbers follow the last result in `stage`.
+            # The code writes eight numbers at once, so up to seven numbers can follow the last result. The
+            # buffer `stage` has space for these numbers.
             stage = (
                 aligned_empty(LANES * block_out[0].size + LANES)
                 if row.has_columns and uses_buffer(out)

@@ -1,8 +1,8 @@
-"""Write a C++11 or CUDA header of function templates for any number type.
+"""Write a header in C++11 or CUDA, with function templates for any number type.
 
-The number type may be `double`, `float`, or a type for automatic differentiation. The CUDA header has the
-same functions for the host and the device. The CUDA header also has a kernel for batches. C functions of the
-header start the kernel.
+The number type may be `double`, `float`, or the type of a library for automatic differentiation. The header
+for CUDA has the same functions for the host and the device, a kernel for batches, and C functions that start
+the kernel.
 """
 
 from __future__ import annotations

@@ -38,8 +38,8 @@ from urdfkin.verify.exact.numbers import (
 )
 from urdfkin.verify.verifier import Verifier
 
-#: Larger angles (rad) are never replaced by multiples of pi/12.
-#: Below this angle, double spacing is far smaller than pi/12.
+#: Larger angles (rad) are never replaced by multiples of pi/12. Up to this angle, the distance between
+#: neighbouring doubles is far smaller than pi/12.
 _MAX_PI_MULTIPLE_ANGLE = 100.0
 #: Sine and cosine of 0, pi/2, pi and 3 pi/2.
 _RIGHT_ANGLES = ((0, 1), (1, 0), (0, -1), (-1, 0))
@@ -122,10 +122,7 @@ def make_exact_plan(
 
 
 def _rotation_with_z_axis(axis: Vector, z: float) -> Matrix:
-    """Compute `rotation_with_z_axis` for an exact unit vector.
-
-    The float `z` is the vector's third component.
-    """
+    """Compute `rotation_with_z_axis` for an exact unit vector; z is its third component as a float."""
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
     scale = -1 / (sign + own)
@@ -229,7 +226,7 @@ def make_exact_functions(
 
 
 def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Evaluate with more than `REFERENCE_DIGITS` digits. Return doubles (n, ...)."""
+    """Evaluate with more than `REFERENCE_DIGITS` digits, and return the results (n, ...) as doubles."""
     with precision(REFERENCE_DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
             list(map(float, evaluate_intervals(function, one)))

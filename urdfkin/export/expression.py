@@ -30,7 +30,7 @@ from typing import Any
 
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: A number is a float or a node of the graph.
+#: A number in an equation is a float or a node of the graph.
 Number = Any
 _EQUATION_NUMBERS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
@@ -87,7 +87,7 @@ class Node:
 class Graph:
     """The expressions of one function."""
 
-    #: Value of x - x and of products with 0.
+    #: Constant that replaces products with 0 and differences x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -146,7 +146,7 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_equation_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Wrap an equation. Each new node stores the number of the outermost equation."""
+        """Wrap an equation, so that each new node stores the number of the outermost equation."""
         found = _EQUATION_NUMBERS.match(equation.__doc__ or "")
         if found is None:
             return equation
@@ -177,7 +177,7 @@ def _negated_operand(x: Number) -> Number:
 
 
 def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
-    """Sort operands of a commutative operation. Then x + y and y + x are one node."""
+    """Sort operands of a commutative operation, so that x + y and y + x are the same node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 

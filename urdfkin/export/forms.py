@@ -1,6 +1,6 @@
-"""Export code for a URDF's joints, a Denavit-Hartenberg table or screws.
+"""Export code that follows a URDF's joints, the rows of a Denavit-Hartenberg table, or screws.
 
-A table or a product of exponentials is first converted to a robot. Each row or screw becomes a joint.
+A table or a product of exponentials is first converted to a robot with one joint for each row or screw.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def make_chain_code(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        # Warnings about the generated URDF do not help the user.
+        # The user did not write the generated URDF, so warnings about it do not help.
         warnings.simplefilter("ignore", UrdfWarning)
         robot = get_hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else robot.link_names[-1]
@@ -83,7 +83,7 @@ def make_chain_code(
 
 
 def _replace_unsafe_names(table: DHTable) -> DHTable:
-    """Replace every name by a safe identifier. A URDF does not allow all names."""
+    """Replace every name by a safe identifier, because a URDF does not allow all names."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

@@ -1,4 +1,4 @@
-"""Make a function of exported code, and bound its rounding errors.
+"""Make a function of the exported code, and bound the rounding errors of the function.
 
 Each function computes one quantity of one frame. These expressions are assigned to variables:
 
@@ -9,10 +9,14 @@ Each function computes one quantity of one frame. These expressions are assigned
 
 All other expressions are parts of larger expressions.
 
-**Single precision.** `single_bounds` bounds the rounding errors to first order in eps. Each operation or
-constant x_i has the rounding error e_i (`urdfkin.kinematics.roundings`). The error of a result y is the sum
-of e_i dy/dx_i. The bound is the sum of |e_i dy/dx_i|. A backward pass over the operations computes the
-derivatives.
+**Single precision.** `single_bounds` bounds the rounding errors to first order in eps. An operation or
+constant of the code has the value x_i with the rounding error e_i (`urdfkin.kinematics.roundings`). A result
+y has this error and this bound:
+
+    error = sum of e_i dy/dx_i
+    bound = sum of |e_i dy/dx_i|
+
+A backward pass over the operations computes the derivatives.
 """
 
 from __future__ import annotations
@@ -44,8 +48,7 @@ INPUT_LETTERS = ("q", "v", "a")
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement of exported code.
 _MAX_STATEMENT_OPERATIONS = 12
-#: Maximum number of results in one backward pass.
-#: The number limits the memory for derivatives.
+#: Maximum number of results in one backward pass, which limits the memory for the derivatives.
 _RESULTS_PER_PASS = 512
 
 
@@ -162,7 +165,7 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 
 
 def _strip_minus(node: Node) -> Node:
-    """Return x for -x. Exported code stores x, and negates each use."""
+    """Return x for -x, because exported code stores x and negates it at each use."""
     return node.operands[0] if node.op == "neg" else node
 
 
@@ -227,7 +230,7 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def add_derivative(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives for x. For a constant x, add its error to the bounds."""
+        """Add `slope` to the derivatives with respect to x; for a constant x, add its error to the bounds."""
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
         elif x in slopes:
@@ -250,7 +253,7 @@ def _bounds_of_results(
 
 
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
-    """Return the rounding errors (n,) of an operation with the results x. The unit is eps = 2^-23."""
+    """Return the rounding errors (n,) of the node's operation with the results x, in eps = 2^-23."""
     size = np.abs(x)
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
@@ -262,7 +265,7 @@ def _operation_error(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant_error(x: float) -> float:
-    """Return the error of a constant in single precision. The unit is eps = 2^-23."""
+    """Return the error of a constant that is rounded to single precision, in eps = 2^-23."""
     size = np.abs(x)
     return float(_add_range_error(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 

@@ -1,7 +1,7 @@
-r"""Write the formulas of the straight-line code as a LaTeX document.
+r"""Write a LaTeX document with the formulas of the straight-line code, in the textbook's symbols.
 
-The document uses the textbook's symbols. In s_2 and R^(2), 2 means the second joint on the path. On a path
-with n joints, the number n + 1 means the frame. A list at the beginning contains the joints' names.
+In symbols such as s_2 and R^(2), the number 2 means the second joint on the path. On a path with n joints,
+the number n + 1 means the frame. A list at the beginning of the document contains the joints' names.
 """
 
 from __future__ import annotations

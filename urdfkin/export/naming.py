@@ -1,6 +1,6 @@
 """Convert names in a URDF to identifiers and comments for exported code.
 
-Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`. Therefore, no
+Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
 identifier is a keyword of a programming language.
 """
 
@@ -50,8 +50,8 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 def function_prefix(robot: str, frame: str) -> str:
     """Return the prefix of a frame's exported functions.
 
-    The prefix begins with a letter and has at most 52 characters. If the names are too long, the prefix
-    contains only the frame's name.
+    The prefix begins with a letter and has at most 52 characters. It contains only the name of the frame if a
+    prefix with the names of the robot and the frame would be longer.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')
@@ -71,7 +71,7 @@ def comment_name(name: str) -> str:
 def comment_text(text: str) -> str:
     """Replace characters that could end a comment.
 
-    Question marks are also replaced. They begin C's trigraphs, such as ??/.
+    Question marks are also replaced, because they begin C's trigraphs, such as ??/.
 
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'

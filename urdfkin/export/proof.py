@@ -1,4 +1,4 @@
-"""Compare exported expressions with Pinocchio, and make a file's test vectors.
+"""Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
 The test vectors check the file, and also the user's compiler, language version and libraries:
 
@@ -45,8 +45,8 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations at which Pinocchio checks the results.
-#: Pinocchio also checks the zero, lower-limit and upper-limit configurations.
+#: Number of random configurations at which Pinocchio checks the results. Pinocchio also checks the results at
+#: the zero configuration and at the lower and upper limits.
 PROOF_SAMPLES = 100
 VECTOR_COUNT = 4
 
@@ -72,8 +72,8 @@ class Proof:
     """Test vectors and comparison with Pinocchio.
 
     Attributes:
-        single_precision_bounds: Largest bound of each quantity, in eps * scale. The scale is at least the
-            sum of |term| over a number's terms. The bound is inf if single precision overflows.
+        single_precision_bounds: Largest bound of each quantity, in eps * scale. The scale is an upper bound
+            on the sum of |term| over a number's terms. The bound is inf if single precision overflows.
         lock: Names and values of locked joints.
     """
 
@@ -166,7 +166,7 @@ def compare_with_pinocchio(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    # Use a copy, because `Robot.certificate` must not count these checks.
+    # Use a copy of the verifier, because `Robot.certificate` must not count the checks of exported code.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
     for function in functions:
@@ -238,7 +238,7 @@ def format_decimal(x: Number) -> str:
     Return "0.0" for an interval that contains 0, or if the midpoint rounds to the double 0.
     """
     ball = as_interval(x)
-    # C compilers warn about a decimal that rounds to 0.
+    # C compilers warn about a nonzero decimal that rounds to 0.
     if ball.contains(0) or float(ball) == 0.0:
         return "0.0"
     digits, e, exponent = ball.str(REFERENCE_DIGITS, radius=False).partition("e")
@@ -253,13 +253,13 @@ def _round_down(x: float) -> str:
 def _round_up(x: float) -> str:
     """Round a bound up.
 
-    A rounded constant's error can equal the bound. A smaller bound could reject a correct result.
+    A smaller bound could reject a correct result, because a rounded constant's error can equal the bound.
     """
     return _round(x, 7, ROUND_CEILING)
 
 
 def _round(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
-        return "0.0"  # With bound 0, the self-test accepts only equal numbers.
+        return "0.0"  # With a bound of 0, the self-test accepts only equal numbers.
     with localcontext(prec=digits, rounding=rounding):
         return f"{float(+Decimal(x)):.{digits}g}"

@@ -1,7 +1,7 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. Only `sympy-exact` has exact constants. A `Dialect` describes
-the code around the expressions for one library.
+The expressions are the same for all libraries, except for `sympy-exact`, which has exact constants. A
+`Dialect` describes the code around the expressions for one library.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Dialect:
         result: Generator of the code lines that return the results.
         imports: Import lines. The names of the used functions replace `{}`, for example `cos, sin`.
         values_body: Body of the exported function `_values`, which evaluates several configurations.
-        input_format: Code pattern for one number of an input, such as `q[0]`.
+        input_format: Pattern of the code for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported `check`.
     """
 
@@ -125,7 +125,7 @@ def _array_first_lines(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `result` function. The code fills no array: JAX's arrays are immutable."""
+    """Return a `result` function; the code fills no array, because JAX's arrays are immutable."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -229,7 +229,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module_code(code: FrameCode) -> str:
-    # The method `forward` calls the function with the fewest inputs.
+    # The method `forward` calls the exported function with the fewest of the inputs q, v and a.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _TORCH_MODULE.format(
         first=first.name,
@@ -241,16 +241,16 @@ def _torch_module_code(code: FrameCode) -> str:
 
 
 def _rotation_rate_bound(plan: CompiledTree) -> float:
-    """Bound a vector's rotation (rad) per change of one coordinate (rad).
+    """Bound the angle (rad) by which a vector rotates if one coordinate changes by 1 rad.
 
-    For each coordinate, s is a sum of |multiplier|. The sum includes all revolute joints that follow the
-    coordinate (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the
-    bound is at least 3.
+    For each coordinate, s is the sum of |multiplier| over the revolute joints that follow the coordinate
+    (mimic rules). The bound is the maximum of 1 and the largest s. With a floating joint, the bound is at
+    least 3.
 
-    Derivation of 3: One component of a unit quaternion changes by t. The body then rotates about a fixed
-    axis. In four dimensions, x is the quaternion's angle to the component's coordinate axis. At t = 0, the
-    rotation angle has the derivatives 2 sin x, -2 sin 2x, 4 sin 3x. The third derivative of a product of F
-    rotated unit vectors is at most:
+    Derivation of 3: If one component of a unit quaternion changes by t, the body rotates about a fixed axis.
+    In four dimensions, x is the angle between the quaternion and the component's coordinate axis. At t = 0,
+    the rotation angle has the first three derivatives 2 sin x, -2 sin 2x and 4 sin 3x. The third derivative
+    of a product of F rotated unit vectors is at most:
 
     `(2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3`
     """
@@ -399,8 +399,7 @@ DIALECTS = {
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
         first_lines=_make_length_check(_LENGTH_MESSAGE),
         result=_make_nested_result("Matrix([", "])"),
-        # SymPy simplifies large expressions slowly.
-        # Therefore, the check runs the code with mpmath's numbers.
+        # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
         values_body='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
         '    numbers |= {"Rational": lambda x, y: mpmath.mpf(x) / y, "Matrix": mpmath.matrix}\n'
         "    with mpmath.workdps(60):\n"

@@ -1,7 +1,7 @@
-"""Compute the textbook's forward recursion (section 7.7) for any type of number.
+"""Compute the forward recursion of the textbook's section 7.7 along one path, for any type of number.
 
-The recursion follows one path. At each joint, the recursion translates along the rigid link. The next steps
-are a constant rotation, and the joint's motion about or along z.
+At each joint, the recursion first translates along the rigid link. It then applies a constant rotation, and
+then the joint's motion about or along z.
 
 | Quantity | Axes of the vectors |
 |---|---|
@@ -9,8 +9,8 @@ are a constant rotation, and the joint's motion about or along z.
 | velocity, acceleration for WORLD | world |
 | other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
 
-For LOCAL_WORLD_ALIGNED, velocity and acceleration are then rotated joint by joint to world axes. These
-rotations need a third fewer operations than the frame's rotation matrix.
+For LOCAL_WORLD_ALIGNED, the velocity and the acceleration are then rotated joint by joint to the world axes.
+These rotations need a third fewer operations than the computation of the frame's rotation matrix.
 """
 
 from __future__ import annotations
@@ -34,9 +34,8 @@ class NumberKind:
     Attributes:
         chapter: The textbook's equations.
         begin_step: Callback before each step, with the step's index as its argument.
-            The steps are joints (0 to n - 1), frame (n) and results (n + 1).
-        end_step: Callback after each joint and after the frame.
-            The arguments are the step's index and the link's state.
+            The steps are the joints (0 to n - 1), the frame (n) and the results (n + 1).
+        end_step: Callback after each joint and after the frame, with the step's index and the link's state.
     """
 
     chapter: Any
@@ -130,7 +129,7 @@ class TreeRecursion(Recursion):
 
 
 def _drop_tiny_entries(x: Sequence[float]) -> Vector:
-    """Replace entries below the largest entry's rounding error by 0.
+    """Replace each entry that is smaller than the largest entry's rounding error by 0.
 
     Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
     `urdfkin.kinematics.roundings` account for the omitted entries.
@@ -178,7 +177,7 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the Hessian (6, nv, nv) row by row.
 
-    The Hessian times v is the Jacobian's time derivative (7.126).
+    The product of the Hessian and v is the time derivative of the Jacobian (7.126).
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
@@ -189,7 +188,7 @@ def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Refere
 
 
 def _recursion(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # WORLD needs the position p in world axes.
+    # The reference WORLD needs the position p, which is computed in world axes.
     return TreeRecursion(plan, kind, inputs, own_axes=not reference.at_world)
 
 
@@ -199,7 +198,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
         case Reference.LOCAL | Reference.WORLD:
-            pass  # `linear` and `angular` already have the reference frame's axes.
+            pass  # `linear` and `angular` are already expressed in the axes of the reference frame.
         case _:
             assert_never(reference)
     return [*linear, *angular]

@@ -1,13 +1,13 @@
-"""Read a robot file with other libraries. Each library has one adapter.
+"""Read a robot file with other libraries, with one adapter for each library.
 
 Besides the standard library, this module imports only NumPy and the chosen library. The command
-`urdfkin readers` runs `main` in a new process. `scripts/make_libraries.py` runs this module as a program, in
-a virtual environment with one library:
+`urdfkin readers` runs `main` in a new process. `scripts/make_libraries.py` runs this module as a program,
+with the Python interpreter of a virtual environment in which one library is installed:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
-The program reads a list of cases `{"name", "text", "configurations"}`. It prints one line of JSON for each
-case. `text`: a URDF text, or the path of an MJCF or USD file. A configuration maps the name of each
+The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
+case. `text` is a URDF text, or the path of an MJCF or USD file. A configuration maps the name of each
 independent joint to the joint's value:
 
 | Joint | Value |
@@ -17,7 +17,7 @@ independent joint to the joint's value:
 | floating | seven numbers (x, y, z, qx, qy, qz, qw) |
 
 An adapter passes all inputs that the library's documentation requires. It passes only values of independent
-joints. The library can read the mimic rules in the file. An adapter does not correct wrong poses.
+joints, because the library can read the mimic rules in the file. An adapter does not correct wrong poses.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from typing import Any
 
 import numpy as np
 
-#: A joint's value: 1 number, 3 (planar) or 7 (floating).
+#: Value of a joint: one number, three numbers for a planar joint, or seven for a floating joint.
 JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
-#: Suffixes of MuJoCo's joints for a planar joint.
+#: Suffixes of the joints that replace a planar joint in MuJoCo.
 _MUJOCO_PLANAR_SUFFIXES = ("_TX", "_TY", "_RZ")
 
 
@@ -54,8 +54,9 @@ class LibraryModel:
 
     Attributes:
         joints: Names of the joints with a coordinate.
-        compute_poses: Returns the pose (4, 4) of each link. Merged links are omitted. The poses of a URDF are
-            relative to the root link. The poses of MJCF and USD files are relative to the world.
+        compute_poses: Returns the pose (4, 4) of each link that the library has not merged with another link.
+            The poses of a URDF are relative to the root link. The poses of MJCF and USD files are relative to
+            the world.
     """
 
     joints: list[str]
@@ -147,7 +148,7 @@ def read_pinocchio(source: str) -> LibraryModel:
 
 
 def _find_joints_of_bodies(path: str) -> dict[str, list[str]]:
-    """Return the joints of each MJCF body, by the name of its first joint."""
+    """Return the joints of each body in an MJCF file, by the name of the body's first joint."""
     bodies: list[list[str]] = []
     with contextlib.suppress(ET.ParseError):
         for body in ET.parse(path).iter("body"):
@@ -174,7 +175,8 @@ def read_mujoco(source: str) -> LibraryModel:
         warnings.simplefilter("ignore")
         model = (mujoco.MjModel.from_xml_path if _is_path(source) else mujoco.MjModel.from_xml_string)(source)
     data = mujoco.MjData(model)
-    # Unnamed bodies and joints have urdfkin's names, such as `joint3`.
+    # If an MJCF body or joint has no name, the adapter uses urdfkin's name for it, which contains its number,
+    # such as `joint3`.
     names = [model.joint(i).name or f"joint{i}" for i in range(model.njnt)]
 
     def compute_poses(values: Mapping[str, JointValue]) -> Poses:
@@ -207,7 +209,7 @@ def read_mujoco(source: str) -> LibraryModel:
 
 
 def _split_mujoco_value(name: str, value: JointValue, names: list[str]) -> Iterator[tuple[str, JointValue]]:
-    """A planar joint is three joints in MuJoCo."""
+    """Yield the values of MuJoCo's joints, because a planar joint is three joints in MuJoCo."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR_SUFFIXES[0] in names:
@@ -342,7 +344,7 @@ def read_kinpy(text: str) -> LibraryModel:
 
 
 def read_ikpy(text: str) -> LibraryModel:
-    """Read one path from the root to a tip. ikpy does not support branches."""
+    """Read only one path from the root to a tip, because ikpy does not support branches."""
     from ikpy.chain import Chain
 
     root, children = _find_root(text), _find_child_links(text)
@@ -402,7 +404,7 @@ def read_newton(path: str) -> LibraryModel:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # Newton adds a free joint to bodies without a joint.
+    # Newton adds a free joint to a body without a joint.
     q_slots = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, mimicked_joint, start, count in zip(
@@ -465,7 +467,7 @@ def version(name: str) -> str | None:
 
 
 def evaluate_case(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """An exception of the library becomes the entry `error`."""
+    """Compute the poses of one case; an exception of the library becomes the entry `error`."""
     try:
         model = LIBRARIES[name].read(case["text"])
         found = [model.compute_poses(values) for values in case["configurations"]]
@@ -490,8 +492,7 @@ def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[s
 def main() -> None:
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    # Standard output is only for the results.
-    # Printed text of the libraries goes to standard error.
+    # Standard output receives only the results; text that a library prints goes to standard error.
     output = os.dup(1)
     os.dup2(2, 1)
     for line in _evaluate_cases(sys.argv[1], json.load(sys.stdin)):

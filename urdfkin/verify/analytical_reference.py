@@ -1,8 +1,8 @@
 """Compute analytical Jacobians (eq. 7.122) from a rotation matrix and a velocity Jacobian.
 
-The Jacobians check the results of `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`. This module
-shares no code with `rotation` or `bodies`. The functions also accept arrays of fifty-digit numbers, for the
-accuracy study.
+urdfkin compares these Jacobians with the results of `urdfkin.kinematics.rotation` and
+`urdfkin.kinematics.bodies`. This module shares no code with `rotation` or `bodies`. The functions also accept
+arrays of fifty-digit numbers, for the accuracy study.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ AnyArray = NDArray[Any]
 def euler_jacobian(axes: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, AnyArray]:
     """Return the Jacobian of position and Euler angles.
 
-    R = R_i R_j R_k: three rotations about coordinate axes. The rotation axes in the world are:
+    R = R_i R_j R_k is a product of three rotations about coordinate axes. The rotation axes in the world are:
 
         first axis = e_i
         third axis = R e_k
@@ -53,7 +53,7 @@ def euler_jacobian(axes: str, R: AnyArray, J_v: AnyArray) -> tuple[AnyArray, Any
 def quaternion_jacobian(quat: AnyArray, J_v: AnyArray) -> AnyArray:
     """Return the Jacobian of position and quaternion.
 
-    The derivative of `quat` contains the angular velocity w:
+    With the angular velocity w, the derivative of `quat` is half a quaternion product:
 
         quat' = (w, 0) quat / 2
 

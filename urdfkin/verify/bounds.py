@@ -1,6 +1,6 @@
 """Bounds on the difference between two correct computations of a quantity.
 
-In an accepted result, each difference from the oracle's number is at most:
+A result is accepted if no number differs from the oracle's number by more than this bound:
 
     k * eps * scale
     eps = 2^-52
@@ -8,14 +8,14 @@ In an accepted result, each difference from the oracle's number is at most:
     joints = number of URDF joints on the path + 1, or + 2 for a rotated base
     tilt = sum of the tilts of these joints, rad (`urdfkin.kinematics.roundings`)
 
-*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute terms. The
-scale has the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel.
-The scale can be broadcast to the shape of the results.
+*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of their absolute values, and
+has the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel. The
+scale can be broadcast to the shape of the results.
 
-*Number k.* k is the allowed number of rounding errors (`urdfkin.kinematics.roundings`). k counts only
-first-order errors in eps. Each joint on the path adds a fixed number of rounding errors. Rotations do not
-amplify errors. Therefore, errors grow linearly with the number of joints. Pinocchio replaces an axis near a
-coordinate axis by the coordinate axis. The tilt is the angle between these two axes.
+*Number k.* The number k is the allowed number of rounding errors, to first order in eps
+(`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. Rotations do
+not amplify errors, so the error of a number grows linearly with the number of joints. Pinocchio replaces an
+axis near a coordinate axis by the coordinate axis. The tilt is the angle between these two axes.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -34,11 +34,11 @@ rounding error:
 | LOCAL | rotation into the frame's axes |
 | WORLD | cross product with the frame's position p |
 
-In measurements, each joint adds less than eps * scale to a difference. Rounding errors rarely all have the
-same sign. Reports state differences in multiples of eps * scale.
+In measurements, each joint adds less than eps * scale to a difference, because rounding errors rarely all
+have the same sign. Reports state each difference as a multiple of eps * scale.
 
-*Magnitudes.* `compute_magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with lengths instead of vectors
-(`urdfkin.kinematics.number_kinds`). No length is negative. Therefore, no intermediate value exceeds the
+*Magnitudes.* `compute_magnitudes` evaluates the equations 7.58 and 7.127 to 7.130 with lengths instead of
+vectors (`urdfkin.kinematics.number_kinds`). No length is negative, so no intermediate value exceeds the
 result.
 
 *Angular acceleration.* The bound on alpha contains w_i instead of w_{i-1}:
@@ -47,7 +47,7 @@ result.
     Pinocchio:   v_i w_i x z
     difference:  v_i^2 z x z = 0, except for rounding errors
 
-Fast joints with an oblique axis have large rounding errors of z x z.
+For a fast joint with an oblique axis, the rounding errors of v_i^2 z x z are large.
 """
 
 from __future__ import annotations
@@ -73,11 +73,10 @@ from urdfkin.model.tree import FloatArray
 
 VERIFY_KERNELS_MODULE = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
-#: Indices in a base's state: position, two velocities, two accelerations.
+#: First indices of position, velocities and accelerations in the state of a moving base.
 _BASE_VECTOR_STARTS = 9, 12, 15, 18, 21
-#: Number of configurations per block of the kernel `lengths`.
-#: The five bounds of one link need 2.5 kB.
-#: The bounds of several links fit into the L1 cache.
+#: Number of configurations per block of the kernel `lengths`. The five bounds of one link need 2.5 kB, so the
+#: bounds of several links fit into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
@@ -86,7 +85,7 @@ class Magnitudes:
     """Upper bounds on the lengths of a frame's position, velocities and accelerations.
 
     Attributes:
-        p: (n, frames) path length (m) from the world origin to the frame. Joint displacements are included.
+        p: (n, frames) path length from the world's origin to the frame, with joint displacements, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
@@ -145,10 +144,9 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 
 
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """The bits equal those of `_fill_without_kernel`."""
+    """Write exactly the same doubles as `_fill_without_kernel`, with the kernel `lengths`."""
     joints = lengths.joints
-    # Stride 0: all configurations share one row.
-    # The kernel receives only the shared row.
+    # If the stride is 0, all configurations share one row, and the kernel receives only this row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -167,7 +165,7 @@ def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArra
 
 
 def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
-    """Each column has length 1 or n."""
+    """Return an array of columns, each of which has length 1 or n."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -187,9 +185,9 @@ class _MovingJoint(NamedTuple):
 class _FrameEnd(NamedTuple):
     """The part of a frame's path after the last moving joint."""
 
-    step: int  # Index in `_Lengths.joints`; -1: no moving joint.
+    step: int  # Index of the last moving joint in `_Lengths.joints`, or -1 if there is none.
     frame: int
-    length: float  # m.
+    length: float  # Length of this part of the path, m.
 
 
 class _Lengths(NamedTuple):
@@ -221,7 +219,7 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _as_columns(x: FloatArray, n: int) -> Any:
-    """For n = 1, return Python numbers, which are faster than arrays."""
+    """Return the columns of x; for n = 1, return Python numbers, which are faster than arrays."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
@@ -233,7 +231,7 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: (number of translations, number of rotations) of a joint.
+#: Number of translations and number of rotations of a planar joint and of a floating joint.
 _TRANSLATION_ROTATION_COUNTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
@@ -276,8 +274,7 @@ def _propagate_state(joint: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: 
 
 _LOCAL_WORLD_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale can overflow to inf.
-#: A comparison accepts no result with an infinite scale.
+#: NumPy need not warn of overflow, because a comparison accepts no result with an infinite scale.
 _allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -299,7 +296,7 @@ class Bound:
 def broadcast_k(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
     """Broadcast `bound.k` to a batch shape.
 
-    k <= 0 or k = inf becomes NaN. A comparison accepts no result with k = NaN.
+    If k <= 0 or k = inf, k becomes NaN, so that no result is accepted.
     """
     k = bound.k.reshape(bound.k.shape[: len(shape)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -350,8 +347,8 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors, in multiples of eps rad.
-        rule_count: Number of rules of all mimic joints on the path. Joint c has two rules if c mimics b and b
-            mimics a.
+        rule_count: Number of rules of all mimic joints on the path. For example, joint c has two rules if
+            c mimics b and b mimics a.
         lengths: (steps + 1,) lengths that are added to `CompiledTree.lengths`, m.
     """
 
@@ -378,7 +375,8 @@ def true_value_magnitudes(
     | axis, used by two rotations | 2 * 0.5 |
     | true value, rounded to 17 digits | 0.5 |
 
-    *Angles and mimic rules.* Errors of angles and mimic rules are added:
+    *Angles and mimic rules.* The errors of angles and mimic rules can exceed this remainder, so they are
+    added:
 
         relative error of roll, pitch and yaw = eps / 2
         rotation of all vectors after the joint <= eps (|roll| + |pitch| + |yaw|) / 2
@@ -541,7 +539,7 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Number of cross products in Pinocchio's linear rows of dJ_i/dq_j.
+#: Number of cross products with which Pinocchio computes the linear rows of dJ_i/dq_j.
 #: The joints on the path are numbered from the root.
 #:
 #: | | Two revolute joints, z x (z x d) | A revolute and a prismatic joint, z x z |
@@ -586,14 +584,14 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     (near, near_mixed), (far, far_mixed) = _CROSS_PRODUCT_COUNTS[reference]
     step, v_index = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
-    # A subnormal multiplier has a large relative error. Therefore, its scale is `SMALLEST_NORMAL`.
+    # A subnormal multiplier has a large relative error, so its scale is `SMALLEST_NORMAL`.
     is_rotation, multipliers = plan.columns[:, ColumnField.IS_ROTATION] == 1, magnitude(plan.multipliers)
     for f, (_, frame) in enumerate(plan.frames):
         columns = np.flatnonzero(plan.target_columns[f] >= 0)
         i, j = columns[:, np.newaxis], columns[np.newaxis, :]
         before = step[j] <= step[i]
         sizes = product(multipliers[i], multipliers[j])
-        # The product of two multipliers may be inf, and inf * 0 is NaN.
+        # The product of two multipliers may be inf, and inf * 0 is NaN, so `np.where` selects the products.
         both = np.where(is_rotation[i] & is_rotation[j], sizes, 0.0)
         one = np.where(is_rotation[i] ^ is_rotation[j], sizes, 0.0)
         entry = frame, v_index[i], v_index[j]
@@ -608,8 +606,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound on Jacobians with Euler angles.
 
-    The position rows have the velocity Jacobian's bound. The other rows are u . w (middle angle) and r . w
-    (first and last angle):
+    The position rows have the same bound as the velocity Jacobian. The other rows are u . w for the middle
+    angle, and r . w for the first and last angle:
 
         w: angular part of a column of the velocity Jacobian
         e_i, u, t = R e_k: first, middle and last axis (`urdfkin.verify.analytical_reference`)
@@ -637,9 +635,8 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
         additional joint in k: at least 24 eps (`PINOCCHIO_ROUNDINGS`) > 13 eps
     """
     s = axis_sine - EPS * magnitudes.roundings
-    # Now, s is a lower bound on |e_i x t|.
-    # s = 0 gives an infinite scale.
-    # A comparison accepts no result with an infinite scale.
+    # Now, s is a lower bound on |e_i x t|. For s = 0, the scale is infinite, and the comparison accepts no
+    # result.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
@@ -651,7 +648,7 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound on Jacobians with quaternions.
 
-    The position rows have the velocity Jacobian's bound. q' has the bound of w:
+    The position rows have the same bound as the velocity Jacobian, and q' has the same bound as w:
 
         delta: error of R
         elements of 4 q q^T: linear functions of R
@@ -681,16 +678,16 @@ def sign_limit(bound: Bound, shape: tuple[int, ...]) -> FloatArray:
 def singularity_margin(plan: CompiledTree) -> float:
     """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    For a base without rotation, the margin is four times the error of a frame's rotation. Below the margin,
+    If the base has no rotation, the margin is four times the error of a frame's rotation. Below the margin,
     no digit of the Euler angles is reliable.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Sum `magnitude(multiplier)` over the joints of a path that share a joint velocity.
+    """Sum |multiplier| over the joints of a path that share a joint velocity.
 
-    A joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
+    For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
     Returns:
         Sums (frames, nv) for rotations, and sums (frames, nv) for translations.
@@ -703,7 +700,7 @@ def sum_multipliers(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += multipliers[c]
         weights.setflags(write=False)
-        # Store only a complete array: other threads read the cache.
+        # The array is stored only when it is complete, because other threads may read the cache.
         plan.cache["column weights"] = weights
     return weights[0], weights[1]
 
@@ -713,8 +710,8 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    All other entries are 0 for every q. Exception: a base motion, for WORLD with `root_at_origin=True`. The
-    other references ignore `root_at_origin`.
+    All other entries are 0 for every q. For WORLD with `root_at_origin=True`, a base motion can make these
+    entries nonzero. The other references ignore `root_at_origin`.
 
         linear rows of a revolute joint: z x d
         WORLD: d leads from the joint to the world's origin

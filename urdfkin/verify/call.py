@@ -1,4 +1,4 @@
-"""Convert arguments to batches with one axis, and results to the caller's shape."""
+"""Convert the arguments of a call to batches with one axis, and the results to the caller's shape."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Call:
     Args:
         plan: Compiles the tree for link indices.
         q_v_a: (q,), (q, v) or (q, v, a).
-        additional_frames: Computed frames that are not part of the result.
+        additional_frames: Frames that the call computes, but that are not part of the result.
         options: Arguments of a quantity, for example `gravity`.
     """
 
@@ -110,8 +110,8 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        An `out` of a subclass other than `memmap` raises InputError. With the `reshape` of a subclass, a
-        kernel could write past the end of `out`.
+        An `out` of a subclass other than `memmap` raises InputError, because a subclass may have a different
+        `reshape`. A kernel could then write past the end of `out`.
         """
         if out is None:
             return None

@@ -327,6 +327,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy's counts begin at 0.
-        # The copy may be in another process.
+        # The counts of a copy begin at 0, because the copy may be used in another process.
         return type(self), ()

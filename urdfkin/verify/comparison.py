@@ -1,8 +1,8 @@
-"""Compare results of urdfkin and an oracle, in eps * scale.
+"""Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
-`disagreement` defines the difference of two numbers. NumPy's differences take as long as Pinocchio's results.
-Therefore, a compiled kernel replaces NumPy after some time (`urdfkin.compiled.preload`). The kernel and NumPy
-return equal numbers.
+`disagreement` defines the difference of two numbers. NumPy takes as long for the differences as Pinocchio
+takes for the results. Therefore, a compiled kernel replaces NumPy after some computing time
+(`urdfkin.compiled.preload`). The kernel and NumPy return equal numbers.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, leading_axes: in
 
 
 def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare `units` with the bound. `units`: largest difference of each result, in eps * scale."""
+    """Compare the largest difference of each result (`units`, in eps * scale) with the bound."""
     if not units.size:
         return BatchComparison()
     bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))
@@ -86,8 +86,8 @@ def bound_ratios(units: FloatArray, k: FloatArray) -> FloatArray:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf for inf or NaN in a number or scale. For unequal numbers with a scale of 0, the result
-    is inf too.
+    The result is inf if a number or its scale is inf or NaN. For unequal numbers with a scale of 0, the
+    result is inf too.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, SMALLEST_SUBNORMAL), 0.0)
     difference = np.abs(ours - theirs)
@@ -116,7 +116,7 @@ def worst_disagreements(
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # Configurations share rows of `scale_rows`: the kernel needs working memory.
+        # If `scale_rows` has fewer than n rows, the kernel needs working memory: `unit`, `units` and `bits`.
         if len(scale_rows) < n:
             unit, units, out_bits = np.empty(scale_rows.size), np.zeros(width), worst.view(np.int64)
             bits = units.view(np.int64)

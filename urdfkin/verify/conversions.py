@@ -9,11 +9,12 @@
 | `check_table_source` | Pinocchio's placements of the tip with the product of a table's matrices (eq. 7.64) |
 | `check_model_source` | placements of all links with the placements of a `pinocchio.Model` |
 
-`check_chain`, `check_opw` and `check_screws` return a line of text. None: Pinocchio cannot check the robot.
+`check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
+cannot check the robot.
 
-For a table or a `pinocchio.Model`, urdfkin writes a URDF text. Both urdfkin and Pinocchio read this text.
-Therefore, equal results do not show that the text is correct. `check_table_source` and `check_model_source`
-compare with the table or the model.
+For a table or a `pinocchio.Model`, urdfkin writes a URDF text. urdfkin and Pinocchio compute from this text,
+so a comparison of their results cannot find an error in the text. Therefore, `check_table_source` and
+`check_model_source` compare with the table or the model.
 """
 
 from __future__ import annotations
@@ -56,10 +57,10 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 #: Number of random configurations. `check_model_source` also compares the neutral configuration.
 _SAMPLE_COUNT = 8
-#: Upper bound of two rounding errors in `check_orientations`, in eps.
-#: Each program's rounding error is less than 8 eps.
-#: Angles need arctan2, sines, cosines and products of three numbers.
-#: Quaternions need a square root, a quotient and products.
+#: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
+#: The error of each program is less than 8 eps. Angles need arctan2, sines, cosines and products of three
+#: numbers (`urdfkin.kinematics.roundings`). Quaternions need a square root, a quotient and products of two
+#: numbers.
 _ORIENTATION_ROUNDINGS = 16.0
 
 
@@ -95,7 +96,7 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
         if not joint.backwards and not joint.kind.turns:
             expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
     differences = np.abs(ours - expected)[:, :, :3]
-    # NaN is a disagreement: NaN <= 1 is False.
+    # NaN is a disagreement: `np.maximum` returns NaN, and the comparison NaN <= 1 is False.
     metres = differences[..., 3].max(initial=0.0)
     direction = np.maximum(differences[..., 2].max(initial=0.0), differences[:, -1, :, :3].max(initial=0.0))
     ends = [i for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
@@ -150,8 +151,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     displacements = screws.coupling.values(coordinates)[:, [not joint.kind.turns for joint in screws.joints]]
     differences = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     chain = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio's placements are relative to the root.
-    # The product of exponentials is relative to the base.
+    # Pinocchio computes the placements of the base and the tip relative to the root. The product of
+    # exponentials is the placement of the tip relative to the base.
     lever = norm(base[:, :3, 3]) + chain.lengths.sum() + np.abs(displacements).sum(axis=-1)
     tree = verifier.tree
     ends = [tree.joints[i] for end in (chain.base, chain.tip) for i in tree.path(tree.frame_link(end))]
@@ -183,7 +184,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
 def _sample_base_and_tip(
     verifier: Verifier, base: str, tip: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return random q (n, nq), and Pinocchio's placements (n, 4, 4) of base and tip."""
+    """Return random q (n, nq), and Pinocchio's placements (n, 4, 4) of the base and of the tip."""
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
     T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
     return q, T[:, 0], T[:, 1]
@@ -194,11 +195,11 @@ def check_orientations(
 ) -> None:
     """Compare Pinocchio's rotations with verified rotations.
 
-    The function compares rotation matrices. Angles at gimbal lock and signs of quaternions are not unique.
-    The bound includes the rounding errors of `R`.
+    The function compares rotation matrices, because angles at gimbal lock and signs of quaternions are not
+    unique. The bound includes the rounding errors of `R`.
 
-    `orientations`: roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last. `make_command(k)`
-    returns a command that computes sample k again.
+    `orientations` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
+    `make_command(k)` returns a command that computes sample k again.
     """
     pin = pinocchio()
     if orientations.shape[-1] == 3:
@@ -238,7 +239,7 @@ def check_model_source(verifier: Verifier, converted: ConvertedModel, source: An
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _compute_model_placements(model, _convert_configurations(model, tree, q), converted)
-    # Factor 2: the URDF text has rounded angles.
+    # The factor 2 allows for rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -269,7 +270,7 @@ def _compute_model_placements(model: Any, q: FloatArray, converted: ConvertedMod
 
 
 def _convert_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert urdfkin's q to q (n, model.nq) of a model with the same joints."""
+    """Convert q of urdfkin's tree to q (n, model.nq) of a model with the same joint names."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
@@ -292,13 +293,12 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     differences = np.abs(theirs - table.placement(own))[:, :3]
-    # The table's base and tool may have only six digits.
-    # The URDF contains exact rotations.
-    # The bound therefore includes `_orthogonality_defect`.
+    # The table's base and tool may have rotations with six digits, but the URDF contains exact rotations. The
+    # bound therefore includes the orthogonality error of the table's rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * written_urdf_roundings(rows) + defect
     allowed = metres * (written_urdf_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
-    # NaN is a disagreement: NaN <= x is False.
+    # A comparison with NaN is False, so NaN is a disagreement.
     if not ((differences[..., 3].max(axis=-1) <= allowed).all() and (differences[..., :3] <= turn).all()):
         raise TableError(
             "the URDF made from a table differs from the table",
@@ -309,6 +309,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _orthogonality_defect(table: DHTable) -> float:
-    """Sum |R^T R - I| (Frobenius norm) for the table's base and tool."""
+    """Sum the Frobenius norms of R^T R - I for the rotations of the table's base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

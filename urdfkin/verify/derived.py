@@ -7,7 +7,7 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `derive_imu_reading` subtracts
-gravity from the oracle's result, in the sensor's axes. The two methods differ. Therefore, a wrong sign of
+gravity from the oracle's result, in the sensor's axes. Because the two methods differ, a wrong sign of
 gravity or a wrong order of steps causes a disagreement.
 """
 
@@ -36,7 +36,10 @@ _ignore_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 def derive_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """`compute_bound` returns the bound on velocity Jacobians."""
+    """Return an oracle's analytical Jacobians, and a bound.
+
+    `compute_bound` returns the bound on velocity Jacobians.
+    """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     J_v = oracle.jacobians(x.query._replace(reference=aligned))
     magnitudes = library.adapt_magnitudes(compute_magnitudes(x.plan, x.q, None, None, x.state))
@@ -46,10 +49,9 @@ def derive_analytical_jacobian(
         quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs = quaternion_jacobian(quat, J_v)
-        # Results have qw >= 0.
-        # Near qw = 0, rounding errors decide the sign of q.
-        # Near qw = 0, the check therefore accepts q and -q.
-        # Products of numbers could leave the range of doubles.
+        # q and -q are the same rotation, and results have qw >= 0. If |qw| is below the rounding error,
+        # rounding decides the sign of q, so both signs are accepted. The signs are compared with sums and
+        # differences, because products could leave the range of doubles.
         same, other = (
             np.abs(x)[..., 3:, :].max(axis=(-2, -1), initial=0.0) for x in (ours - theirs, ours + theirs)
         )
@@ -66,7 +68,7 @@ def derive_analytical_jacobian(
 def derive_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's poses of frames b relative to frame a, and a bound.
+    """Return an oracle's poses of the frames b relative to the frame a, and a bound.
 
     The last frame of `x.plan` is frame a.
 

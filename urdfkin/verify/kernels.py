@@ -32,7 +32,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL, SMALLEST_SUBNORMA
 
 _INFINITY_BITS = 0x7FF0000000000000
 _MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: With row i, the kernel prefetches row i + _PREFETCH_DISTANCE.
+#: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
 _PREFETCH_DISTANCE = 4
 
 
@@ -61,7 +61,7 @@ def _in_eps_scale(difference, size):
 
 @inline_function(fastmath={"nnan", "nsz"})
 def _largest_difference(ours, theirs, scale, i, k):
-    """Return the largest difference in row i, in eps * scale[k]. All numbers are finite."""
+    """Return the largest difference in row i, in multiples of eps * scale[k]; all numbers must be finite."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _in_eps_scale(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -81,7 +81,7 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Write the largest difference of column j's rows x, y, z to `units[j]`.
+    """Write the largest difference of the rows x, y and z in column j to `units[j]`.
 
     The difference is in multiples of `unit[j]`, and may be NaN or inf.
     """
@@ -99,8 +99,8 @@ def _divide_triples(ours, theirs, unit, width, units):
 def _largest_bits(x, count):
     """Return the bits of the largest double.
 
-    The bits of doubles >= 0, as integers, have the doubles' order. The function ignores the sign bit. Some
-    processors set the sign bit of NaN.
+    As integers, the bits of doubles >= 0 have the same order as the doubles. The function ignores the sign
+    bit, because some processors set the sign bit of NaN.
     """
     most = 0
     for j in range(count):
@@ -124,8 +124,9 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     The compiler can vectorize the maximum of integers, but not of doubles.
 
     - `scale`: the rows repeat if `scale` is shorter than `out`
-    - `out`: largest difference in each row, in eps * scale; inf for inf or NaN
-    - `unit`, `units`: working memory for repeated rows; sizes: `scale`, one row of `scale`
+    - `out`: largest difference in each row, in units of eps * scale; inf if a number or a scale is inf or NaN
+    - `unit`, `units`: working memory, as large as `scale` and as one row of `scale`;
+      used only if the rows repeat
     - `out_bits`, `bits`: views of `out` and `units` as integers
     """
     is_known_finite = has_triples = len(scale) < len(out)
@@ -159,8 +160,8 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 def coupling(full, columns, index, factor, out):
     """Add Jacobian columns of mimic joints.
 
-    `factor[i]` * full[:, i] is added to column `index[i]` of the sum. `out` contains the rows of the sum, one
-    after the other.
+    Column i of `full` is multiplied by `factor[i]` and added to column `index[i]` of the sum. `out` contains
+    the rows of the sum, one after the other.
     """
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):
@@ -172,8 +173,8 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
-#: Number of bounds per link: p, w, vel, alpha and acc.
-#: Each joint in `free` has five numbers (`urdfkin.verify.bounds._free_lengths`).
+#: Number of bounds per link: p, w, vel, alpha and acc. `free` also has five numbers for each planar or
+#: floating joint (`urdfkin.verify.bounds._free_lengths`).
 _STATE_SIZE = _FREE_SIZE = 5
 
 
@@ -199,7 +200,7 @@ _LENGTHS = {
     "rotate": _ignore_rotation,
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
-# Numba accepts functions that are attributes of a module.
+# Numba can call functions that are attributes of a module.
 _EQUATIONS: Any = ModuleType("length_equations")
 vars(_EQUATIONS).update(vars(bind_equations(decorate=inline_function(), **_LENGTHS)))
 _STEPS = rebind_functions(steps, decorate=inline_function(), replacements={"eq": _EQUATIONS})

@@ -1,12 +1,12 @@
-"""Read an MJCF file in a confined process, and compare the robot with MuJoCo's model.
+"""Read an MJCF file in a process with limits on time and memory, and compare the robot with MuJoCo's model.
 
-The process has limits on time and memory. Pinocchio reads the URDF text that urdfkin writes for the tree. The
-conversion from the MJCF file to the tree needs other checks. `load` therefore makes three comparisons:
+Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
+from the MJCF file to the tree. `load` therefore makes three comparisons:
 
-- MuJoCo's placements of bodies and sites must agree with the tree's placements.
+- MuJoCo computes the placements of bodies and sites, which must agree with the tree's placements.
 - The joint equalities of MuJoCo's model must agree with the tree's mimic rules.
-- Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently.
-  Therefore, a difference from Pinocchio is reported, but is no error.
+- Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently, so a
+  difference from Pinocchio is reported, but is not an error.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ class MjcfReading:
 
     Attributes:
         remarks: Elements that the tree lacks.
-        path: None for MJCF text.
+        path: Path of the file, or None for MJCF text.
         answer: Last answer with a robot, from the process that reads the file.
         shapes_refusal: Reason why MuJoCo compiles the file only without shapes and inertias. None if MuJoCo
             compiles the complete file. Not valid with `with_check_data=False`.
-        pinocchio: Body placements by Pinocchio's MJCF reader, or an error. None: no answer.
+        pinocchio: Placements of bodies by Pinocchio's MJCF reader, an error, or None without an answer.
     """
 
     urdf: str
@@ -137,7 +137,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     """Compare a robot with MuJoCo's model, and return a sentence about the result.
 
     Raises:
-        OracleError: A body, a site or a mimic rule differs by more than rounding errors.
+        OracleError: A body, a site or a mimic rule differs from MuJoCo's by more than rounding errors.
         RangeError: The bound on a position exceeds the range of doubles.
     """
     tree, answer = verifier.tree, reading.answer
@@ -145,7 +145,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
-    # Factor 2: the URDF text has rounded angles.
+    # The factor 2 allows for the rounded angles in the URDF text.
     magnitudes = mujoco_magnitudes(compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE))
     bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -175,7 +175,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Return the largest ratio error / bound. None: the robot has no mimic rules."""
+    """Return the largest ratio of error to bound, or None for a robot without mimic rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())

@@ -1,17 +1,17 @@
-"""Compile an MJCF file with MuJoCo and Pinocchio, in a separate process.
+"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader, in a separate process.
 
-A few lines of MJCF can require any amount of time and memory. They can also crash a parser. Examples are
-nested `<replicate>` and `nuser_body`. The process reads a request from standard input. The process writes
-each answer as a line of JSON:
+A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory,
+or crash a parser. The process reads a request from standard input, and writes each answer as a line of JSON
+to standard output:
 
 1. the robot, compiled without shapes and inertias
-2. the robot, compiled from the complete file, or MuJoCo's reason for an error
+2. the robot, compiled from the complete file, or the reason why MuJoCo does not compile this file
 3. the placements of the bodies by Pinocchio's reader
 
-A request without samples gets no third answer. It gets the second answer only if MuJoCo aligns a free body
+A request without samples gets no third answer, and gets the second answer only if MuJoCo aligns a free body
 with its inertial frame.
 
-If the process ends early, its earlier answers remain valid.
+If the process ends early, the answers that it has already written remain valid.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             mjcf = complete
         except (MemoryError, InputError, import_mujoco().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
-                raise  # MuJoCo compiles the file; urdfkin rejects the model.
+                raise  # MuJoCo compiles the file, but urdfkin does not support the model.
             found = error.found if isinstance(error, InputError) else str(error)
             yield {"shapes_refusal": _add_memory_hint(found) or _MEMORY_HINT}
     if samples and path is not None:
@@ -175,7 +175,7 @@ def _compute_with_pinocchio(path: str, mjcf: Mjcf, q: FloatArray) -> dict[str, A
 def _compute_pinocchio_placements(
     path: str, qpos: FloatArray, qpos_index: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    # `qpos_index`: each joint's first index in `qpos`.
+    # `qpos_index` contains each joint's first index in a row of `qpos`.
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
@@ -197,7 +197,7 @@ def _compute_pinocchio_placements(
                 q[first : first + 7] = [*qpos_row[at : at + 3], *np.roll(qpos_row[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # Pinocchio: a revolute joint without limits has (cos, sin).
+            else:  # In Pinocchio, a revolute joint without limits has two coordinates: cosine and sine.
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]

@@ -1,21 +1,22 @@
 """The oracle MuJoCo.
 
-MuJoCo's own parser reads the origins and axes of joints from the URDF text. Unlike urdfkin and Pinocchio,
-MuJoCo computes with unit quaternions. MuJoCo's six-vectors refer to a centre of mass. This module changes the
-text before MuJoCo reads the text:
+MuJoCo reads the origins and axes of joints from the URDF text with its own parser. Unlike urdfkin and
+Pinocchio, MuJoCo computes with unit quaternions, and MuJoCo's six-vectors refer to a centre of mass. This
+module changes the text before MuJoCo reads it:
 
-- Each link becomes a body without meshes. In the compiled model, only the root has a mass. Therefore,
-  MuJoCo's centre of mass is the root's origin.
-- Links and joints get numbers as names. MuJoCo reserves some names.
-- A floating joint becomes three slide joints and a ball joint. MuJoCo's free joint can only connect a body to
-  the world. A planar joint becomes two slide joints and a hinge.
-- Mimic rules are removed. MuJoCo would convert mimic rules to constraints. MuJoCo's kinematics ignores
-  constraints. This module computes mimic joints with the rules from `parse_mimic_rules`.
+- Each link becomes a body without meshes. In the compiled model, only the root has a mass.
+  The centre of mass, to which MuJoCo's results refer, is therefore the root's origin.
+- Links and joints get numbers as names, because MuJoCo reserves some names.
+- A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
+  body to the world. A planar joint becomes two slide joints and a hinge.
+- Mimic rules are removed. MuJoCo would convert mimic rules to constraints, and MuJoCo's kinematics ignores
+  constraints. This module computes the values of mimic joints with the rules from `parse_mimic_rules`.
 
-MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. S' is the time derivative of S. The robot's
-Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. S also
-rotates the linear velocity of a floating or planar joint. In urdfkin, this velocity is in the child link's
-axes. In MuJoCo, slide velocities are in the joint frame's axes. The angular velocities are equal.
+MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
+Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
+floating or planar joint, urdfkin's linear velocity is in the axes of the child link. The velocities of
+MuJoCo's slide joints are in the axes of the joint frame. S therefore also contains the rotation from the
+child's axes to the joint frame's axes. The angular velocities are equal.
 """
 
 from __future__ import annotations
@@ -46,11 +47,10 @@ from urdfkin.verify.pinocchio import tree_depth
 
 #: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
-#: Maximum number of joints on a path.
-#: MuJoCo's loading time grows with (number of links)^2.
-#: MuJoCo's own limit (1,023 links) applies only after loading.
+#: Maximum number of joints on a path. MuJoCo's loading time grows with the square of the number of links.
+#: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
 _MAX_DEPTH = 1_000
-#: MuJoCo's joints for one joint, in coordinate order.
+#: MuJoCo's joints for a planar or floating joint, in coordinate order.
 _REPLACEMENT_JOINTS = {
     "planar": ("slide x", "slide y", "hinge"),
     "floating": ("slide x", "slide y", "slide z", "ball"),
@@ -77,9 +77,9 @@ class _MujocoIndices:
     qpos: int
     qvel: int
     q: int  # -1 for a moving base.
-    v: int  # -1: a moving base or a locked joint.
-    multiplier: float  # Mimic multiplier; 1: no mimic rule; 0: a locked joint.
-    offset: float  # Mimic offset, or a locked joint's value.
+    v: int  # -1 for a moving base or a locked joint.
+    multiplier: float  # Multiplier of the mimic rule; 1 without a mimic rule, 0 for a locked joint.
+    offset: float  # Offset of the mimic rule, or the value of a locked joint.
 
 
 class MujocoOracle(Oracle):
@@ -153,8 +153,7 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if source is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := source.get(name)) is not None})
-        # MuJoCo requires limits of a prismatic joint.
-        # MuJoCo's kinematics ignores the limits.
+        # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element
@@ -237,11 +236,11 @@ class MujocoOracle(Oracle):
         poses = self._compute_poses(x, 2, store)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         reference = Reference.of(x.reference)
-        if reference.own_axes:  # Rotating axes: dJ/dt has the additional term -w x J.
+        if reference.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _change_reference(reference, poses, rate, columns=True)
-        if reference.at_world:  # d/dt (p x J_angular) contains vel x J_angular.
+        if reference.at_world:  # The derivative of p x J_angular contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -258,7 +257,7 @@ class MujocoOracle(Oracle):
     def _compute_poses(
         self, x: QueryBatch, input_count: int, store: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
-        """Return all placements. For each sample k and frame f, call `store(body, (k, f))`.
+        """Return all placements, and call `store(body, (k, f))` for each sample k and frame f.
 
         MuJoCo receives the first `input_count` of q, v and a.
         """
@@ -327,8 +326,7 @@ class MujocoOracle(Oracle):
             qacc = (S @ x.a[..., None] + self._compute_velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
         qvel = np.array(np.broadcast_to(qvel, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The slide joints' velocity is in world axes.
-            # The ball joint's velocity is in the base's axes.
+            # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
             at, back = self._indices[0].qvel, np.swapaxes(_make_rotation_matrix(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             qvel[:, at : at + 3] = velocity[..., :3]
@@ -357,7 +355,7 @@ class MujocoOracle(Oracle):
     def _compute_velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the time derivative of S.
 
-        The rotation R of a floating or planar joint satisfies R' = R [w]x.
+        The rotation R of a floating or planar joint has the derivative R [w]x.
         """
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
@@ -372,7 +370,10 @@ class MujocoOracle(Oracle):
 
 
 def _compute_joint_rotations(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return rotations (n, s, s) and the number s of slide joints."""
+    """Return rotations (n, s, s) and the number s of slide joints.
+
+    A planar joint has s = 2, and a floating joint has s = 3.
+    """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _make_rotation_matrix(_normalise_quaternion(coordinates)), 3
@@ -386,8 +387,7 @@ def _normalise_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    # Only the root has a mass.
-    # Therefore, the centre of mass is exactly the root's origin.
+    # If only the root has a mass, the model's centre of mass is exactly the root's origin.
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
         mass[:] = 0.0
@@ -400,7 +400,7 @@ def _move_mass_to_root(model: Any, root: str) -> Any:
 
 
 def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints depth first, and the links root first. Siblings are sorted by name."""
+    """Return the joints depth first, with siblings sorted by name, and the links root first."""
     robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     children, child_links = dict[str, list[_Joint]](), set[str]()

@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo.
 
-An oracle is a library with independent results, for a comparison with urdfkin's results. This module also
-converts the user's arguments for the oracle. Other code converts the arguments for urdfkin's own computation.
-The two conversions share only the code for units and named poses. A wrong broadcast, order or name in one
-conversion therefore causes a disagreement.
+An oracle is a library whose results urdfkin compares with its own results. This module also converts the
+user's arguments into the form that an oracle receives. This conversion and the conversion for urdfkin's own
+computation share only the code for units and named poses. A wrong broadcast, order or name in one conversion
+therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -17,12 +17,12 @@ Mimic rules: Pinocchio's model is built without mimic joints (`urdfkin.verify.pi
 therefore reads the mimic rules from the URDF text.
 
 Layout of urdfkin's q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one
-number. A planar joint has three, a floating joint seven, and a mimic joint none.
+number, a planar joint has three, a floating joint has seven, and a mimic joint has none.
 
-Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation
-nearest to M. For R, `urdfkin.kinematics.rotation` uses one Newton step. This module uses Davenport's
-q-method. The quaternion q of R maximizes q^T K q = trace(R(q)^T M). Therefore, q is the eigenvector of K for
-the largest eigenvalue.
+Moving base: the user gives the base's orientation as a matrix M. The base's rotation R is the rotation that
+is nearest to M. urdfkin computes R with one Newton step (`urdfkin.kinematics.rotation`), but this module uses
+Davenport's q-method. The quaternion q of R maximizes q^T K q = trace(R(q)^T M), so q is the eigenvector of K
+for the largest eigenvalue.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def parse_mimic_rules(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules.
 
-    Each chain becomes one rule:
+    Each chain becomes one rule that refers to the independent joint:
 
         q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
     """
@@ -106,7 +106,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 
 #: Pairs (nq, nv) of three kinds of joints in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-#: urdfkin's nq of a joint, by Pinocchio's (nq, nv).
+#: Number nq of a joint in urdfkin. The key is the pair (nq, nv) of the joint in Pinocchio.
 _URDFKIN_NQ = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
@@ -157,7 +157,7 @@ class PinocchioLayout:
                 _JointIndices(size, *full, *at[rule.mimicked_joint], rule.multiplier, rule.offset)
             )
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: v_full[i] = _factor[i] * v[_index[i]]; a base has the factor 0.
+        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`. For the base, the factor is 0.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -166,7 +166,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._collect_arrays(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: Whether Pinocchio's q (`_same_q`) or v (`_same_v`) equals urdfkin's.
+        #: True if Pinocchio can use q (`_same_q`) or v (`_same_v`) without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -327,16 +327,18 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (scalar last) of the rotation nearest to M."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # The computed q has rounding errors along K's other eigenvectors.
-    # For a rotation M, K + I = 4 q q^T.
-    # Therefore, multiplying by K + I removes these errors.
+    # Because of rounding, the computed q has small components along the other eigenvectors of K. If M is a
+    # rotation, multiplication by K + I = 4 q q^T removes these components.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
 
 
 def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
-    """Return Davenport's matrix K of M. K = 4 q q^T - I if M is the rotation of q."""
+    """Return Davenport's matrix K of M.
+
+    If M is the rotation of the quaternion q, K is 4 q q^T - I.
+    """
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -363,9 +365,9 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Suffixes of coordinate names. Keys: nv (planar 3, floating 6).
+#: Suffixes of coordinate names, by the number of joint velocities: planar joint 3, floating joint 6.
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
-#: Suffixes of velocity names. Keys: nv.
+#: Suffixes of velocity names, by the number of joint velocities.
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
@@ -430,10 +432,10 @@ class QueryBatch(NamedTuple):
     """The arguments of an oracle for n configurations.
 
     Attributes:
-        frames_are_joints: If True, `frames` contains `JointFrame` objects. The oracle then calls functions
-            for joints, such as `getJointJacobian`.
-        uses_multi_frame_functions: If True, the oracle uses the functions for several frames, even for one
-            frame. These functions may round differently.
+        frames_are_joints: If True, `frames` contains `JointFrame` objects, and the oracle calls Pinocchio's
+            functions for joints, such as `getJointJacobian`.
+        uses_multi_frame_functions: If True, Pinocchio computes the Jacobian of one frame with the functions
+            for several frames. These functions may round differently.
     """
 
     frames: Sequence[str]
@@ -460,7 +462,7 @@ class OracleQuery:
     """The user's arguments of one call.
 
     Args:
-        named_inputs: The user's text or mapping for q, v and a. None: an array.
+        named_inputs: The user's text or mapping for each of q, v and a, or None for an array.
         joints: Pairs (name, nv).
     """
 
@@ -537,7 +539,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flatten_result(self, result: FloatArray, own_axes: int) -> FloatArray:
-        """Reshape a result to (n, frames, ...). The last `own_axes` axes stay unchanged.
+        """Reshape a result to (n, frames, ...), without a change of the last `own_axes` axes.
 
         Raises:
             OracleError: the batch shapes of the result and of the arguments differ.
@@ -569,12 +571,12 @@ class Oracle:
 
     Args:
         mimic: If False, mimic joints are independent joints.
-        moving_base: A free-flyer moves the root.
-        root_joint: Kind of the additional root joint.
+        moving_base: Whether a free-flyer moves the root.
+        root_joint: Kind of the root joint that is added to the joints of the text.
         lock: Values of locked joints, rad or m.
 
     Attributes:
-        new_data: Makes the data for one thread.
+        new_data: Function that makes the data for one thread.
     """
 
     title: ClassVar[str]
@@ -598,8 +600,8 @@ class Oracle:
         """Return the joints' mimic rules.
 
         Raises:
-            OracleError: a mimic rule is invalid. Or the names or the order of joints or coordinates differ
-                from the tree's.
+            OracleError: a mimic rule is invalid, or the oracle's joints or coordinates have other names or
+                another order than the tree's.
         """
         tree = self.tree
         rules = read_mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -659,10 +661,10 @@ class Oracle:
 def couple_columns(
     full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
 ) -> FloatArray:
-    """Return J_full G. The kernel and NumPy return identical results.
+    """Return the product J_full G; the kernel and NumPy return identical results.
 
-    Each i in `columns` adds `factor[i]` * J_full[:, i] to column `index[i]`. The order of `columns` is the
-    order of the additions.
+    For each i in `columns`, column i of J_full is multiplied by `factor[i]` and added to column `index[i]` of
+    the product. The order of `columns` is the order of the additions.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=VERIFY_KERNELS_MODULE)) is None:

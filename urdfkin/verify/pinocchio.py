@@ -1,14 +1,14 @@
 """The oracle Pinocchio.
 
 Only this module and `urdfkin.verify.adapters` import Pinocchio. On PyPI, Pinocchio has the name `pin`. The
-PyPI project `pinocchio` contains plugins for the test runner nose. The plugins' module is also called
-`pinocchio`. If `pin` and `pinocchio` are installed, Python imports the plugins.
+PyPI project `pinocchio` contains plugins for the test runner nose, in a module that is also called
+`pinocchio`. If both projects are installed, Python imports the plugins.
 
 The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF text with its own parser.
 
-Pinocchio's model is built without mimic joints. With mimic joints, Pinocchio 4.1 rejects four of its own
-example robots. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic joints. They have
-the suffix "full". The mimic rules define a matrix G and a vector g_0:
+Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
+with mimic joints. Pinocchio's vectors and Jacobians therefore contain numbers for the mimic joints. Their
+names have the suffix "full". The mimic rules define a matrix G and a vector g_0 for the conversion:
 
     q_full = G q + g_0
     v_full = G v
@@ -42,7 +42,7 @@ from urdfkin.verify.oracle import (
     read_mimic_rules,
 )
 
-#: urdfkin's tests confirm Pinocchio's definitions only for this major version.
+#: urdfkin's tests confirm Pinocchio's definitions of accelerations and J-dot only for this major version.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -108,24 +108,21 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Stack size per link.
-#: The parser of Pinocchio 4.1.0 needs less than 4 kB.
+#: Bytes of stack for each link. The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: Shorter chains cause no stack overflow in any thread.
+#: Pinocchio reads chains with fewer joints without a stack overflow, in any thread.
 _SAFE_DEPTH = 100
-#: Maximum nv of a robot, mimic joints included.
-#: Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured).
-#: For nv = 315, Pinocchio needs 2 GB.
+#: Maximum nv of a robot, including mimic joints. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which
+#: is 2 GB at this limit.
 MAX_NV = 315
 
-#: A block of 128 kB fits into the processor's cache.
+#: Number of doubles in a block of results. A block of this size (128 kB) fits into the processor's cache.
 _FLOATS_PER_BLOCK = 16384
-#: f(n) returns the results of the next n configurations.
+#: A function of n that returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
 
-#: Prefix of link names in `buildReducedModel`.
-#: XML forbids U+0001, so no URDF name has this prefix.
+#: Prefix of link names during `buildReducedModel`. XML forbids U+0001, so no URDF name has this prefix.
 _LINK_PREFIX = "\x01"
 
 
@@ -140,11 +137,11 @@ def build_model(
 ) -> Any:
     """Build Pinocchio's model of a URDF text.
 
-    A limit on nv and a large stack prevent a crash. `lock` contains the values of locked joints, rad or m.
-    `lock_mimic_joints` also locks the mimic joints of locked joints.
+    A limit on nv and a large stack prevent a crash of the process. `lock` contains the values of locked
+    joints, rad or m. With `lock_mimic_joints`, the mimic joints of locked joints are locked too.
 
     Raises:
-        OracleError: nv > `MAX_NV`, Pinocchio rejects the text, or a joint to lock is missing.
+        OracleError: nv is above `MAX_NV`, Pinocchio rejects the text, or a joint to lock does not exist.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -178,8 +175,7 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` confuses a link and a joint with equal names.
-    # Link names therefore get a prefix.
+    # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_PREFIX + frame.name
@@ -205,8 +201,7 @@ def _parse_model(text: str, tree: KinematicTree, root_joint: str | None, mimic: 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # urdfkin has already checked the text for all known causes.
-        # Therefore, the cause of this error is unknown.
+        # urdfkin has already checked the text for all known causes, so the cause of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -236,8 +231,7 @@ class PinocchioOracle(Oracle):
     def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer as the base. Return the new indices of joints and frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects a link and a joint with equal names.
-        # All joints and frames therefore get unique names.
+        # `appendModel` rejects links with the name of a joint, so all joints and frames get unique names.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -342,12 +336,13 @@ class PinocchioOracle(Oracle):
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Pinocchio's Hessians. Two errors of Pinocchio 4.1 are corrected.
+        """Return Pinocchio's Hessians, with two errors of Pinocchio 4.1 corrected.
 
-        - Pinocchio's array has C order, but the numbers have Eigen's order. In Eigen's order, the first index
-          varies fastest.
-        - In LOCAL, Pinocchio's derivative of a column by the same joint's coordinate can be nonzero. The true
-          derivative is 0. In the frame's axes, a joint's motion does not change its columns.
+        - Pinocchio's array has C order, but the numbers have Eigen's order, in which the first index varies
+          fastest.
+        - In LOCAL, Pinocchio's derivative of a joint's column by the same joint's coordinates can be nonzero.
+          The true derivative is 0, because a joint's motion does not change the joint's own columns in the
+          frame's axes.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, reference, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
@@ -367,11 +362,10 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the joint Jacobian (n, 6, columns) in WORLD. Mimic joints are included, the base is not."""
+        """Return the joint Jacobian (n, 6, columns) in WORLD, with mimic joints and without the base."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes for a Jacobian without columns.
-        # For one column, Pinocchio 4.1 returns a vector.
+        # Pinocchio 4.1 crashes for a Jacobian without columns, and returns a vector for one column.
         for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -408,7 +402,7 @@ def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
 
 def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Yield results in blocks of `memory`. Later blocks may overwrite earlier blocks."""
-    # Pinocchio 4.1 crashes for a Jacobian without columns.
+    # Pinocchio 4.1 crashes the process for a Jacobian without columns.
     if 0 in memory.shape:
         yield memory
         return

@@ -1,7 +1,7 @@
-"""The table of quantities: names, shapes, functions, bounds and help texts.
+"""The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
-Methods of `Robot`, checks, reports and the command line use the table. Functions in the table are imported at
-their first use. Therefore, `--help` does not import NumPy.
+The methods of `Robot`, the checks, reports and the command line use this table. The table names functions by
+text and imports them at their first use, so that `--help` does not import NumPy.
 
 >>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)
@@ -57,15 +57,15 @@ class Quantity:
         ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
-        factors: Number of vectors in the longest product. For example, w x (w x d) has 3 vectors.
+        factors: Number of vectors in the longest product, for example 3 for w x (w x d).
             `make_bound` adds 1 to `factors` for LOCAL and WORLD.
         results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
-            the bound. If present, this function replaces `ask_oracle` and `scale`.
+            the bound. Checks call this function, if there is one, instead of `ask_oracle` and `scale`.
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
-        recursive: Whether one forward recursion computes the result. False for results with further arguments
-            such as `gravity`.
+        recursive: Whether one forward recursion computes the result, without further arguments such as
+            `gravity`.
         in_validation: `validate` compares the quantity if `recursive` and `in_validation` are True. False for
-            Hessians: nv times larger than Jacobians.
+            Hessians, which are nv times larger than Jacobians.
         has_reference: Whether `compute`, `scale` and `compute_intervals` have the argument `reference`.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.

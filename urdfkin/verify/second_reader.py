@@ -1,11 +1,11 @@
-"""Read a robot's URDF with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
+"""Read a robot's URDF a second time with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
 
-Pinocchio checks the computed results. This module checks the robot's data: links, joint kinds, origins, axes,
-limits, mimic rules. The readers of yourdfpy and urdfkin share no code.
+Pinocchio checks the computed results. This module checks the data of the robot: links, joint kinds, origins,
+axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-The library yourdfpy 0.0.60 has two known faults. It ignores the attribute `quat_xyzw` of an origin. It does
-not normalise axes. The report separates these faults from other differences. For a number that the URDF
-omits, yourdfpy returns None. Then the comparison uses urdfkin's default value.
+yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
+normalise axes. The report separates these faults from other differences. If the URDF omits a number, yourdfpy
+returns None, and the comparison uses urdfkin's default value.
 """
 
 from __future__ import annotations
@@ -31,23 +31,20 @@ from urdfkin.verify.oracle import resolve_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest difference of a rotation entry in two programs.
-#: An entry is a b c + d e with |a b c| + |d e| <= 1.
-#: Relative error of a sine or cosine: at most eps.
-#: The errors of a to e add at most 3 eps.
-#: The products and the sum add at most 1.5 eps.
-#: Two programs: 2 (3 + 1.5) eps = 9 eps.
+#: Bound on the difference of an entry if two programs compute a rotation matrix from the same angles. An
+#: entry is a b c + d e with sines and cosines a to e, and |a b c| + |d e| <= 1. Each sine and cosine has a
+#: relative error of at most one eps, which changes the entry by at most 3 eps. Rounding the products and the
+#: sum changes the entry by at most 1.5 eps. Two programs therefore differ by at most 2 (3 + 1.5) eps = 9 eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Largest difference of an axis component in two programs.
-#: Relative error of an axis length: at most 2 eps.
-#: The quotient is rounded once, with at most 0.5 eps.
-#: Two programs: 2 (2 + 0.5) eps = 5 eps.
+#: Bound on the difference of a component if two programs normalise an axis. In each program, the relative
+#: error of the axis's length is at most 2 eps, and the quotient adds at most 0.5 eps. Two programs therefore
+#: differ by at most 2 (2 + 0.5) eps = 5 eps.
 _AXIS_TOLERANCE = 5.0 * EPS
-#: An axis is a unit axis if |length - 1| <= _UNIT_TOLERANCE.
+#: Largest accepted difference between 1 and the length of yourdfpy's axis.
 _UNIT_TOLERANCE = 1e-6
 _MAX_DIFFERENCES = 8
 _MAX_QUOTE_LENGTH = 200
-#: Kinds of joints with position limits.
+#: Kinds of joints that have position limits in the URDF specification.
 _BOUNDED_KINDS = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -75,10 +72,10 @@ def compare_with_yourdfpy(
 ) -> SecondReading:
     """Compare yourdfpy's tree with urdfkin's tree.
 
-    With `root_joint`, the tree's first link and first joint are not compared.
+    If `root_joint` is True, the tree's first link and first joint are not compared.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    # With a document type declaration, yourdfpy may read other files.
+    # A document type declaration can make yourdfpy read other files.
     if "<!DOCTYPE" in text:
         return SecondReading(by, unread="the file has a document type declaration")
     try:
@@ -116,8 +113,7 @@ def read_with_yourdfpy(text: str) -> yourdf.Robot:
     """Read a URDF text without meshes. yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
-    # The text is encoded as UTF-8.
-    # An XML declaration could name another encoding.
+    # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True

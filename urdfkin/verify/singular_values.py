@@ -17,7 +17,7 @@
 
 *Range.* Intermediate norms and products stay within the range of doubles. Before a norm is computed, all
 numbers are divided by the largest number. Products are computed from mantissas and exponents. If the residual
-overflows, the bounds are 0 and inf.
+overflows, the lower bound is 0 and the upper bound is inf.
 """
 
 from __future__ import annotations
@@ -37,8 +37,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
-#: Largest relative rounding error of a sum of products.
-#: The bound covers a few dozen positive numbers.
+#: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
 _RELATIVE_ROUNDING_ERROR = 256.0 * EPS
 _MAX_PRINTED_SAMPLES = 10
 
@@ -184,11 +183,12 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
         The derivative of a singular value is u^T J' v. The vectors u and v are the left and the right
-        singular vector. J' is the derivative of J. If the smallest singular value may be 0, the result is
-        NaN. The gradient may not exist.
+        singular vector, and J' is the derivative of J. If the smallest singular value may be 0, the gradient
+        may not exist, and the result is NaN.
 
         Args:
-            H: (..., 6, nv, nv) `Robot.hessian` of the frame in LOCAL_WORLD_ALIGNED, for the same q and base.
+            H: (..., 6, nv, nv) Hessian of the frame in LOCAL_WORLD_ALIGNED, from `Robot.hessian` with the
+                same q and base.
 
         Raises:
             InputError: H has another shape or contains a number that is not finite.
@@ -257,7 +257,7 @@ def singular_values(
         defect = _bound_orthogonality_error(U) + _bound_orthogonality_error(Vt.swapaxes(-1, -2))
         lower = s * _bound_below(1.0 - defect)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _bound_above(1.0 + defect)[..., np.newaxis] + residual[..., np.newaxis]
-    # A NaN becomes 0 (lower) or inf (upper).
+    # NaN becomes 0 as a lower bound, and inf as an upper bound.
     lower, upper = (
         np.nan_to_num(_bound_below(lower), nan=0.0),
         np.nan_to_num(_bound_above(upper), nan=np.inf, posinf=np.inf),
@@ -275,8 +275,7 @@ def _bound_orthogonality_error(U: FloatArray) -> FloatArray:
 def _bound_norm(E: FloatArray) -> FloatArray:
     """Return an upper bound on the Frobenius norm of each matrix. All numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix with inf is not scaled.
-    # The norm of such a matrix is inf.
+    # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

@@ -1,4 +1,4 @@
-"""Explain a singular Jacobian: rank, lost directions, and joints that cause the loss of rank.
+"""Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss of rank.
 
 | Term | Meaning |
 |---|---|
@@ -6,8 +6,8 @@
 | null motion | right null vector of J, that is, joint velocities that do not move the frame |
 | minimal dependent set | linearly dependent columns that are independent if any column is removed |
 
-The joints of a minimal dependent set cause the loss of rank. A geometric reason is, for example, parallel
-axes. The columns must satisfy its condition within the error bound of J:
+The joints of a minimal dependent set cause the loss of rank. The module states a geometric reason, such as
+parallel axes, only if the columns satisfy the condition within the error bound of J:
 
     column of a revolute joint: [a x z; z]
     z: direction of the axis
@@ -30,15 +30,15 @@ from urdfkin.kinematics.number_kinds import norm
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Maximum size of a set of linearly dependent columns.
+#: Maximum number of columns in a minimal dependent set that the search finds.
 _MAX_SET_SIZE = 4
-#: `_find_dependent_sets` skips Jacobians with more columns.
+#: Maximum number of columns for the search. If a Jacobian has more columns, the search is skipped.
 _MAX_COLUMNS = 16
-#: A singular value's error is at most
+#: Factor in the bound on the error of a singular value. The bound is
 #: _ROUNDINGS * (rows + columns) * eps * (Frobenius norm).
 _ROUNDINGS = 16.0
-#: Singular values below _RANK_TOLERANCE * norm count as 0.
-#: Unit vectors are parallel if only one value exceeds _RANK_TOLERANCE.
+#: At random configurations, singular values count as 0 if they are below this fraction of the norm. Unit
+#: vectors count as parallel if all singular values except the largest are below this number.
 _RANK_TOLERANCE = 1e-9
 
 
@@ -49,10 +49,11 @@ class FrameJacobian:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, in world axes.
         error: (..., 6, nv) bounds on the errors of J.
-        is_revolute: (nv,) True: column of a revolute or continuous joint. False: prismatic joint. None:
-            planar, floating or mimicked joint.
+        is_revolute: (nv,) True for the column of a revolute or continuous joint, False for a prismatic joint.
+            None for the columns of a planar or floating joint, and of a joint that another joint mimics.
         active_entries: (6, nv) False for entries of J that are always 0.
-        sample_jacobians: Returns Jacobians (n, 6, nv) at random configurations. The base is fixed.
+        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations, with a fixed
+            base.
         moving_base: Whether a base motion is given. A base motion can change the directions without motion.
     """
 
@@ -160,9 +161,8 @@ class _SingularityExplainer:
         generic_rank, fixed_directions = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _make_orthonormal_basis(directions - directions @ fixed_directions @ fixed_directions.T)
-        # A Jacobian with more rows than columns has fixed directions.
-        # The frame never moves in a fixed direction.
-        # Fixed directions that depend on q look like lost directions.
+        # If the Jacobian has more rows than columns, the frame never moves in some directions. If these
+        # directions depend on q, they look like directions that are lost only at this q.
         is_known = len(directions) == generic_rank - self._rank and not (
             self._frame_jacobian.moving_base and fixed_directions.size
         )
@@ -187,10 +187,9 @@ class _SingularityExplainer:
         The columns span the directions in which the frame moves in no sample.
         """
         samples = self._frame_jacobian.sample_jacobians()[:, self._rows[:, None], self._moving]
-        # An axis may pass through the frame's origin for every q.
-        # In this case, the samples consist of rounding errors.
-        # `_bound_matrix_error` includes the base's distance from the world origin.
-        # The samples have no base, so `_RANK_TOLERANCE` limits the noise.
+        # An axis may pass through the frame's origin for every q. In this case, the samples consist of
+        # rounding errors. `_bound_matrix_error` includes the base's distance from the world origin, but the
+        # samples have no base, so `_RANK_TOLERANCE` limits the noise.
         noise = min(self._bound_matrix_error(), _RANK_TOLERANCE)
         tolerances = np.maximum(noise, _RANK_TOLERANCE * norm(samples.reshape(len(samples), -1)))
         generic_rank = int(np.linalg.matrix_rank(samples, tol=tolerances).max())
@@ -222,7 +221,7 @@ class _SingularityExplainer:
             yield self._describe_null_motion(motions[0, self._moving])
         else:
             moving = np.flatnonzero(self._remove_noise(motions)[:, self._moving].any(axis=0))
-            # If all numbers are noise, the text names all joints.
+            # The noise can exceed all numbers of the motions. In this case, the text names all joints.
             joints = _join_names([self._names[i] for i in moving] or self._names)
             frame = self._frame_jacobian.frame
             yield f"{len(motions)} independent joint motions of {joints} do not move {frame}."
@@ -301,11 +300,11 @@ class _SingularityExplainer:
         signs = np.sign(z @ z[0])[:, None]
         if are_parallel and np.abs(v - signs * v[0]).max() <= tolerance:
             return f"{axes} are collinear."
-        # Three dependent lines, parallel or concurrent, are coplanar.
-        # Four such lines need not be coplanar.
+        # Three dependent lines that are parallel or concurrent are always coplanar, but four need not be
+        # coplanar.
         if are_parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(columns) == 3 else ''}."
-        # Axes through a point a have columns [a x z; z].
+        # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > tolerance * float(np.linalg.cond(crosses)):

@@ -1,7 +1,7 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of the tip.
 
-A table computes the tip t relative to the table's base b. Pinocchio computes t and b in the world. The base b
-may move too. An example is a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
+A table computes the tip t relative to the table's base b. Pinocchio computes t and b in the world. The base
+may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
 motion of b and of t in the world, and r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
@@ -9,12 +9,12 @@ motion of b and of t in the world, and r = p_t - p_b:
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These are eq. 7.124 and 7.125, solved for the relative motion. This module has its own code for the equations.
-The table's results come from `urdfkin.kinematics.equations`.
+These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module
+implements the equations again, because the table's results come from `urdfkin.kinematics.equations`.
 
-*Bound.* The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping may have rounded
-angles of the table to multiples of 15 degrees. The bound includes the change of the angles. The bound on
-linear rows grows with a length L:
+*Bound.* The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If snapping has rounded
+angles of the table to multiples of 15 degrees, the bound includes this change. The bound on linear rows grows
+with a length L:
 
     reach = (path length from the root to the base) + (path length from the root to the tip)
     prismatic displacements: included in both path lengths
@@ -23,11 +23,12 @@ linear rows grows with a length L:
     S > reach:  L = min(S, MAX_LENGTH_RATIO * reach)
     Hayati rows: no length in the table exceeds MAX_LENGTH_RATIO * reach (docs/dh.md)
 
-*Mimic joints.* A coordinate and its mimic joints move together. The bound on a Jacobian column is
-proportional to the sum of the joints' absolute multipliers.
+*Mimic joints.* A coordinate and its mimic joints move together. The bound on a Jacobian column is therefore
+proportional to the sum of the absolute multipliers of these joints.
 
-*Loss.* Without a Hayati row, nearly parallel axes can need table lengths of kilometres. If two long lengths
-cancel, the tip's error is eps times the lengths. `TableCheck.loss` states the error, which urdfkin accepts.
+*Loss.* Without a Hayati row, nearly parallel axes can require lengths of kilometres in the table. If two of
+these lengths cancel, the tip has an error of eps times the lengths. urdfkin accepts this error, and
+`TableCheck.loss` states it.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from urdfkin.model.configuration import Samples
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
-#: Largest ratio L / reach (see the module).
+#: Largest ratio of the length L to the reach (see the module).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -147,7 +148,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
 
 
 def sum_table_lengths(table: DHTable) -> float:
-    """Return the sum of all lengths, with base and tool, m."""
+    """Return the sum (m) of all lengths in a table, including its base and tool."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
@@ -175,8 +176,8 @@ def _compare_with_bounds(
     ones = np.ones_like(error_scales.reach)
     columns = error_scales.turning + error_scales.sliding
     reach, slides = error_scales.reach[:, None], 1.0 if error_scales.sliding.any() else 0.0
-    #: Each quantity has two pairs (scale, snapping): linear and angular.
-    #: difference <= scale * (relative rounding error) + snapping
+    #: Each quantity has a pair (scale, snapping) for linear differences, and a pair for angular differences.
+    #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((error_scales.reach, snap_effect.metres), (ones, snap_effect.turn)),
         "jacobian": (
@@ -245,7 +246,7 @@ def compute_relative_motion(
 class ErrorScales:
     """Lengths, sums of |v| and |a|, and relative errors, for the bounds on rounding errors.
 
-    The sums include all joints on the paths from the root to base and tip.
+    All sums are over the joints on the paths from the root to the table's base and tip.
 
     Attributes:
         reach: (n,) length L of the module's docstring, m.
@@ -253,8 +254,8 @@ class ErrorScales:
         sliding: (columns,) sum of |multiplier| over the prismatic joints.
         rates: (n,) sum of |multiplier * v| over all joints.
         accelerations: (n,) sum of |multiplier * a| over all joints.
-        rounding: (n,) relative error. The table may treat nearly parallel axes as parallel. The bound
-            includes the angle between these axes.
+        rounding: (n,) relative error. The bound includes angles between axes that the table treats as
+            parallel.
     """
 
     reach: FloatArray
@@ -294,8 +295,8 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
     table_length = sum_table_lengths(table)
     reach = np.maximum(reach, np.minimum(table_length, MAX_LENGTH_RATIO * reach))
-    # `Joint.pinocchio_tilt`: angle between urdfkin's and Pinocchio's axis of a joint.
-    # Factor 4: an acceleration term has up to 4 rotated vectors.
+    # `Joint.pinocchio_tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio. A
+    # term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     roundings = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * roundings + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)

@@ -1,16 +1,16 @@
-"""Read a USD stage in a confined process, and compare the robot with OpenUSD's readers.
+"""Read a USD stage in a process with limits on time and memory, and compare the robot with OpenUSD's readers.
 
-The process has limits on time and memory. Pinocchio reads the URDF text that urdfkin writes for the tree. The
-conversion from the USD stage (scene) to the tree needs other checks. `load` therefore makes two comparisons:
+Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
+from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 
-- OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin must find the same bodies, frames,
-  degrees of freedom and limits. A difference raises OracleError.
-- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The file states prim
-  transforms separately from joint frames. In the stage's configuration, each link must have its prim's
-  transform. `load` reports a difference as a warning.
+- OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin's parser must find the same bodies,
+  frames, degrees of freedom and limits for each joint. A difference raises OracleError.
+- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The file states these
+  transforms separately from the joint frames. In the stage's configuration of the joints, each link must have
+  its prim's transform. `load` reports a difference as a warning.
 
-A stage stores numbers in single precision. The two comparisons allow only differences that single precision
-can cause.
+A stage stores numbers in single precision. Both comparisons allow only differences that rounding to single
+precision can cause.
 """
 
 from __future__ import annotations
@@ -40,14 +40,15 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Tolerance for the angle (rad) between a joint's two frames.
-#: Unit: SINGLE_ROUNDOFF. Derivation: `_check_joint`.
+#: Tolerance for the angle (rad) between urdfkin's and UsdPhysics's orientation of the same joint frame. The
+#: unit is SINGLE_ROUNDOFF, the relative error of one rounding to single precision. `_check_joint` derives
+#: this bound.
 _ROTATION_ROUNDINGS = 18.0
-#: Tolerance for the origin of a joint's frame.
-#: Unit: SINGLE_ROUNDOFF. Derivation: `_check_joint`.
+#: Tolerance for the distance between urdfkin's and UsdPhysics's origin of the same joint frame. The unit is
+#: SINGLE_ROUNDOFF times `UsdJoint.length_sum`. `_check_joint` derives this bound.
 _ORIGIN_ROUNDINGS = 3.0
-#: Bound on the angle error (rad) of one transform operation.
-#: Unit: SINGLE_ROUNDOFF. Derivation: `_compare_prim_poses`.
+#: Bound on the angle error (rad) of one operation in a prim's transform, such as a rotation. The unit is
+#: SINGLE_ROUNDOFF. `_compare_prim_poses` derives this bound.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 
@@ -174,9 +175,9 @@ class SinglePrecisionErrors:
     """Bounds on errors of rounding to single precision.
 
     Attributes:
-        links: (links, 2) largest position error (m) and angle error (rad) in any configuration.
-        joints: (joints, 3) position error (m), angle error (rad), and relative error of the mimic rule. The
-            position and angle errors are those of the child link's pose in the parent link, at q = 0.
+        links: (links, 2) largest position error (m) and largest angle error (rad) in any configuration.
+        joints: (joints, 3) position error (m), angle error (rad), and relative error of the mimic rule.
+            The first two are errors of the child link's pose in the parent link, at q = 0.
     """
 
     links: FloatArray
@@ -277,7 +278,7 @@ def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)[0]
-    # Poses are relative to the root, whose pose is arbitrary.
+    # The root's pose is arbitrary, so poses are relative to the root.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
@@ -318,8 +319,7 @@ def _compare_prim_poses(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple
             f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
             f" by up to {worst[0]:.3g} m"
         )
-        # An error of one body displaces all later bodies.
-        # Therefore, only the first difference is reported.
+        # An error of one body displaces all later bodies, so only the first difference is reported.
         return line, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

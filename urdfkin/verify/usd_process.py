@@ -1,7 +1,7 @@
-"""Read a USD stage in a separate process, with urdfkin and OpenUSD.
+"""Read a USD stage in a separate process, with urdfkin's reader and with OpenUSD's readers.
 
-A USD stage (scene) can require any amount of time and memory. A stage can crash OpenUSD's C++ parsers. The
-request and the answer are JSON on standard input and standard output.
+A USD stage (scene) can require any amount of time and memory, or crash OpenUSD's parsers, which are written
+in C++. The request and the answer are JSON on standard input and standard output.
 
 OpenUSD's package UsdPhysics has its own code for bodies, joint frames and limits. The answer contains the
 data from UsdPhysics and from `urdfkin.urdf.usd`, for a comparison.
@@ -24,7 +24,7 @@ from urdfkin.urdf.usd import Usd, UsdJoint, import_openusd, read_usd
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.mjcf_process import make_error_answer, pack_array, write_answer
 
-#: |limit| >= _LARGEST_SINGLE means: no limit.
+#: A limit of at least this absolute value means that the joint has no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
 
@@ -69,7 +69,7 @@ def _read_joints_twice(usd: Usd) -> dict[str, Any]:
         parsed = load(usd.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, description in zip(paths, descriptions, strict=True):
-            # PhysicsArticulationRootAPI on a joint: OpenUSD also describes an articulation.
+            # For a joint with PhysicsArticulationRootAPI, OpenUSD also describes an articulation.
             if str(path) in usd.joints and isinstance(description, physics.JointDesc):
                 found[str(path)] = _describe_joint(physics, str(path), description, usd)
     return {path: [ours.as_list(), found.get(path)] for path, ours in usd.joints.items()}
@@ -108,7 +108,7 @@ def _read_limits(physics: Any, path: str, description: Any, usd: Usd) -> tuple[f
     ends = {"lower": -np.inf, "upper": np.inf}
     for end in ends:
         x = float(getattr(limit, end))
-        # UsdPhysics returns 90 or -90 for a blocked limit.
+        # UsdPhysics returns 90 and -90 for the blocked limits of revolute and prismatic joints.
         is_blocked = end in names and prim.GetAttribute(names[end]).Get() is None
         if not is_blocked:
             ends[end] = x if abs(x) < _LARGEST_SINGLE else float(np.copysign(np.inf, x))

@@ -1,7 +1,7 @@
-"""Compare a robot's results with Pinocchio or MuJoCo, and record the checks.
+"""Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
 
-The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape.
-Therefore, the check also finds errors in the conversion to the batch shape.
+The oracle receives the user's arguments. `Verifier.check` receives results in the user's batch shape, and
+therefore also finds errors in the conversion to this shape.
 """
 
 from __future__ import annotations
@@ -45,12 +45,10 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Random configurations in the check of a table.
-#: The check adds zero and limit configurations.
+#: Number of random configurations in the check of a table, besides zero and limit configurations.
 TABLE_SAMPLES = 40
 
-#: True: check all results of a call. False: check none.
-#: "sample": check `SAMPLE_SIZE` configurations of a call.
+#: True checks all results of a call, False checks none, and "sample" checks `SAMPLE_SIZE` configurations.
 Verify = bool | Literal["sample"]
 
 SAMPLE_SIZE = 100
@@ -103,11 +101,14 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy has no checked results and no oracles.
+        # A copy has no checked results, and builds its own Pinocchio and MuJoCo models.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the robot's oracle. With `base`, the oracle's model has a free-flyer."""
+        """Return the robot's oracle.
+
+        If `base` is given, the oracle's model has a free-flyer.
+        """
         key = library.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = library.make_oracle(
@@ -133,7 +134,8 @@ class Verifier:
         )
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        # Pinocchio may refuse the robot but accept the locked robot.
+        # Pinocchio may refuse the robot but accept the locked robot, which has fewer moving joints.
+        # Therefore, the new verifier does not keep Pinocchio's refusal.
         known_refusal = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -230,8 +232,8 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that calls `compute` and checks the result.
 
-        The returned function has the arguments of `compute`; the last argument is `out`. It returns None in
-        two cases: `compute` does not support the arguments, or the oracle cannot check the robot.
+        The returned function has the arguments of `compute`; the last argument is `out`. It returns None if
+        `compute` does not support the arguments, or if the oracle cannot check the robot.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -406,7 +408,7 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    For revolute joints, a fixed base and a quantity of q, the bound is constant.
+    The bound is constant if the quantity needs only q, the base is fixed and all joints are revolute.
     """
     v, a = (*x.rates, None, None)[:2]
     is_constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
@@ -426,7 +428,7 @@ def compute_own_results(quantity: Quantity, x: CallPart) -> FloatArray:
     return quantity.compute_results(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-#: NumPy's warnings are redundant: the comparison reports inf and NaN.
+#: The comparison reports inf and NaN, so NumPy need not warn.
 _ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 
@@ -456,7 +458,7 @@ def as_verify(verify: object) -> Verify:
 def split_into_parts(verify: Verify, n: int, values_per_configuration: int) -> Iterator[slice | IntArray]:
     """Split the checked configurations into parts, and yield the indices of each part.
 
-    With "sample", the configurations are random. Equal steps could match a pattern in the batch.
+    With "sample", the configurations are random, because equal steps could match a pattern in the batch.
     """
     step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, values_per_configuration)))
     if verify == "sample" and n > SAMPLE_SIZE:

@@ -1,9 +1,10 @@
-"""Modules that need Numba: number types, kernels, cache of kernels.
+"""The modules that need Numba: number types, kernels, and the cache of kernels.
 
-Numba reads settings from `.numba_config.yaml` in the current folder. This happens during Numba's import and
-before each compilation. The file can select a cache folder. Numba executes the files of the cache. A
-malicious file could therefore run any code. This package imports Numba in another folder, and prevents later
-reading of the file. If a program imports Numba first, this protection fails.
+Numba reads settings from a file `.numba_config.yaml` in the current folder, during its import and before each
+compilation. The file can select a cache folder, and Numba executes the files in the cache. A malicious file
+could therefore run any code. To prevent this, this package imports Numba in the folder `/` if the current
+folder contains such a file, and then disables the reading of the file. If a program imports Numba first, this
+protection fails.
 """
 
 from __future__ import annotations

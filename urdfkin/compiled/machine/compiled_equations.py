@@ -11,5 +11,5 @@ globals().update(vars(bind_equations(decorate=inline)))
 
 
 def __getattr__(name: str) -> Any:
-    # Python calls this function for unknown names only.
+    # Python calls this function only for names that this module does not contain.
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

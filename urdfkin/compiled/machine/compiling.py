@@ -40,8 +40,8 @@ _dumps: Any = dumps
 class KernelCache(_NullCache):  # type: ignore[misc]
     """The disk cache of one function.
 
-    The folder's name depends on the sources of `compiled` and `kinematics`. `urdfkin.verify` also has
-    kernels. The key therefore contains the function's source file.
+    The folder's name depends only on the sources of `compiled` and `kinematics`, but `urdfkin.verify` also
+    has kernels. The key of a cache file therefore contains the text of the function's source file.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, report_start: Callable[[], None]) -> None:
@@ -54,16 +54,16 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         if (content := read_cached_file(path)) is not None:
             try:
                 return _CompileResult._rebuild(target_context, *pickle.loads(content))
-            # Another version of Numba may have written the file.
-            # Reading such a file can raise any exception.
+            # The file's checksum is correct, but another version of Numba may have written the file. Reading
+            # a file from another version can raise any exception.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")
         self._report_start()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        # Dynamic globals are memory addresses of this process.
-        # Code with dynamic globals cannot be cached.
+        # Code with dynamic globals contains memory addresses that are valid only in this process. Such code
+        # cannot be cached.
         if not cres.library.has_dynamic_globals:
             write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 
@@ -85,7 +85,7 @@ _register_pass: Any = register_pass
 
 class _InlinedLibrary(_CodeLibrary):  # type: ignore[misc]
     def finalize(self) -> None:
-        """Complete the library without machine code."""
+        """Complete the library without generating machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -99,11 +99,11 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
     _name = "inlined_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Translate to LLVM code only."""
+        """Translate the function to LLVM code, but not to machine code."""
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba finds the code by `handle`, without calling `handle`.
+        # Numba finds the compiled code by the Python function `handle`, but never calls `handle`.
         descriptor, environment = state.cr.fndesc, state.cr.env
         handle = make_function(
             descriptor.lookup_module(), descriptor.qualname, "", 0, environment, (state.library,)
@@ -142,9 +142,9 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Without fast math, the compiler neither reorders nor fuses operations.
-#: Division by zero gives inf: loops have no error branch.
-#: The functions allocate no memory: arrays need no reference counts.
+#: Without fast math, the compiler neither reorders nor fuses operations, so results do not depend on the
+#: compiler. Division by zero gives inf, so loops contain no branch that raises an error. The functions
+#: allocate no memory, so arrays need no reference counts.
 COMPILE_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _INLINE_OPTIONS: dict[str, Any] = {
     "forceinline": True,
@@ -190,7 +190,7 @@ def jit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 inline = jit(**_INLINE_OPTIONS)
 
-# A read-only type also accepts writable arrays, without a copy.
+# A read-only argument type also accepts a writable array, without a copy.
 FLOATS_1D = types.Array(types.float64, 1, "C", readonly=True)
 FLOATS_2D = types.Array(types.float64, 2, "C", readonly=True)
 INTS_1D = types.Array(types.int64, 1, "C", readonly=True)
@@ -210,9 +210,8 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # This method replaces a `cached_property`.
-        # Before Python 3.12, a `cached_property` has a lock.
-        # A fork could leave such a lock locked.
+        # This method replaces a `cached_property`, because before Python 3.12 a fork could leave the lock of
+        # a `cached_property` locked.
         if name != "compiled_function":
             raise AttributeError(name)
         with compile_lock:
@@ -242,7 +241,7 @@ class Kernel:
 class CKernel(Kernel):
     """A compiled function that C code can call.
 
-    All arguments are integers. Python calls the function through ctypes, without the global interpreter lock.
+    All arguments are integers. A call from Python uses ctypes, which releases the global interpreter lock.
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
@@ -266,5 +265,5 @@ def inline_function(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator that makes kernels; `arguments` are Numba types."""
+    """Return a decorator that makes kernels with arguments of the given Numba types."""
     return lambda function: Kernel(function, arguments)

@@ -1,7 +1,7 @@
 """The compiled recursions, one for each function of the module `recursions`.
 
-A kernel computes eight configurations at a time. Each lane of a vector register contains one configuration. A
-single configuration fills all eight lanes. The result is exactly the same as in a batch.
+A kernel computes eight configurations at a time, one in each lane of a vector register. A single
+configuration is computed in all eight lanes, so its result is exactly the same as in a batch.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
 from urdfkin.compiled.machine.compiling import CKernel, inline
 from urdfkin.kinematics.arithmetic import rebind_functions
 
-#: {name of a Python object: compiled object that replaces it}.
+#: Compiled objects that replace Python objects of the same name.
 _REPLACEMENTS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}

@@ -1,8 +1,8 @@
 """Transfer numbers between arrays and scratch memory, eight configurations at a time.
 
-In an array, all numbers of one configuration are adjacent. A row of scratch memory has `LANES` doubles: one
-quantity of eight configurations. The transfer is therefore a transposition. A block contains 8, 4, 2 or 1
-numbers of each configuration. Shuffle instructions transpose a block.
+In an array, all numbers of one configuration are adjacent. Scratch memory consists of rows of `LANES`
+doubles. A row contains one quantity of all eight configurations. The transfer is therefore a transposition.
+Shuffle instructions transpose blocks of 8, 4, 2 or 1 numbers of each configuration.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ def _make_pointer_function(kind: Any) -> Any:
 doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
-#: `prefetch` does nothing for more doubles.
-#: 3072 doubles: 24 KiB, half of a 48 KiB L1 cache.
+#: Maximum number of doubles that `prefetch` loads. If `count` is larger, `prefetch` does nothing. 3072
+#: doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_PREFETCHED = 3072
 
 
@@ -115,10 +115,7 @@ def _slice_vector(builder: Any, vector: Any, start: int, width: int) -> Any:
 
 
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Concatenate vectors of equal length.
-
-    The number of vectors must be a power of two.
-    """
+    """Concatenate vectors of equal length; the number of vectors must be a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -129,8 +126,8 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     """Transpose each square block of a matrix.
 
-    `vectors` are the rows. Their number must be a power of two. Each pass treats blocks of 2 w by 2 w
-    numbers. The pass exchanges the upper right and the lower left quarter.
+    `vectors` are the rows, and their number must be a power of two. Each pass exchanges the upper right and
+    the lower left quarter of each block of 2 w by 2 w numbers.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -245,10 +242,7 @@ def write_rows(m, scratch, rows, first, count, to, at, stride):
 
 @intrinsic
 def _prefetch(context: Any, x: Any, at: Any) -> Any:
-    """Load the cache line of `x[at]`.
-
-    An address beyond the array causes no error.
-    """
+    """Load the cache line of `x[at]`; an address beyond the array causes no error."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -269,7 +263,7 @@ def prefetch(x, at, count):
             _prefetch(x, number)
 
 
-#: `x[at + _PREFETCH_DISTANCE]` is prefetched while `x[at]` is read.
+#: While `x[at]` is read, `x[at + _PREFETCH_DISTANCE]` is loaded into the cache.
 _PREFETCH_DISTANCE = 512
 
 
@@ -293,13 +287,14 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add the squares of `count` numbers to the lanes of `total`.
 
-    The last `count % 8` squares are added in all eight lanes. Bounds:
+    The last `count % 8` squares are added in all eight lanes. Therefore, the sum of all lanes has these
+    bounds:
 
         sum of squares <= sum of lanes <= 8 * sum of squares
 
     `is_in_range` compares the sum of all lanes with NO_OVERFLOW_BOUND^2.
     """
-    # The processor adds to four sums at the same time.
+    # Four sums are faster than one, because the processor adds to different sums at the same time.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
     end = at + count
     while at + 4 * LANES <= end:
@@ -333,10 +328,7 @@ def is_in_range(total):
 
 @intrinsic
 def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy eight numbers past the caches.
-
-    `to[at]` must begin a cache line.
-    """
+    """Copy eight numbers, bypassing the caches; `to[at]` must begin a cache line."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
@@ -352,8 +344,9 @@ def _stream_eight(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]` and the next elements.
 
-    Whole cache lines bypass the caches. A store into the caches would first read the cache line. `count` must
-    be at least 7: up to 7 numbers precede the first whole line. `address` is the address of `to[0]`.
+    Whole cache lines bypass the caches, because a store into the caches would first read the cache line.
+    `count` must be at least 7, because up to 7 numbers precede the first whole line. `address` is the address
+    of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

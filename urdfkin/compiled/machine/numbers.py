@@ -1,6 +1,4 @@
-"""Number types for compiled code.
-
-A value is one double or a vector of doubles.
+"""Number types for compiled code: one double, a vector of doubles, or a constant known at compile time.
 
 | Type or function | Value |
 |---|---|
@@ -10,8 +8,9 @@ A value is one double or a vector of doubles.
 | `zero()`, `one()` | 0 and 1, known at compile time |
 | `unused()` | placeholder for a number that is not needed |
 
-The sum x y + z is one fused multiply-add, with only one rounding. This module decides which operations are
-fused, not the compiler. `Lanes(1)` and `Lanes(8)` therefore give exactly the same doubles, on every machine.
+In the sum x y + z, the product and the sum are one fused multiply-add, which is rounded only once. This
+module, and not the compiler, decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are
+therefore exactly the same doubles, on every machine.
 
 Each operation with `unused()` gives `unused()`. Operations with constants are simplified at compile time.
 """
@@ -231,7 +230,7 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
 
 
 def _lower_sum(*, negative: bool) -> Callable[..., Any]:
-    """Return the code generator for x + y, or for x - y if `negative`."""
+    """Return the function that generates code for x + y, or for x - y if `negative`."""
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def apply_sign(value: Any) -> Any:

@@ -37,7 +37,7 @@ _TWO_OVER_PI = 2.0 / math.pi
 def sine_cosine(scratch, row, x):
     """Return sines and cosines of angles.
 
-    If an angle is nan or large, scratch row `row` receives the angles.
+    If an angle is nan or large, the function writes the angles to scratch row `row`.
     """
     sine, cosine = _small_sine_cosine(x)
     if _any_large(x):
@@ -51,10 +51,7 @@ def sine_cosine(scratch, row, x):
 
 @intrinsic
 def _small_sine_cosine(context: Any, x: Any) -> Any:
-    """Return sines and cosines of angles below `LARGEST_ANGLE`.
-
-    Other results are not valid.
-    """
+    """Return sines and cosines of angles below `LARGEST_ANGLE`; other results are not valid."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -76,23 +73,20 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         shifted = build_fma(builder, x, all_lanes(_TWO_OVER_PI), all_lanes(ROUNDING_SHIFT))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(ROUNDING_SHIFT))
-        # Let d be the double nearest to pi/2.
-        # If n != 0, x and n d are multiples of 2^-53.
-        # |x - n d| < 1, so this difference is exact.
-        # If n = 0, then x - n d = x, which is also exact.
-        # `r_error`: rounding error of r. `z_error`: rounding error of z = r^2.
+        # Let d be the double nearest to pi/2. If n != 0, x and n d are multiples of 2^-53, and |x - n d| is
+        # less than 1, so this difference is exact. If n = 0, then x - n d = x, which is also exact. `r_error`
+        # is the rounding error of r, and `z_error` is the rounding error of z = r^2.
         near = build_fma(builder, n, all_lanes(-PI_2), x)
         r = build_fma(builder, n, all_lanes(-PI_2_REST), near)
         r_error = build_fma(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_error = build_fma(builder, r, r, builder.fneg(z))
-        # `leading` = 1 - z/2, start of the cosine's series.
-        # `leading_error` is the rounding error of `leading`.
+        # `leading` is 1 - z/2, the beginning of the cosine's series; `leading_error` is its rounding error.
         leading = build_fma(builder, z, all_lanes(-0.5), all_lanes(1.0))
         leading_error = build_fma(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), leading))
-        # First order: sin(r + r_error) = sin r + r_error cos r,
-        # cos(r + r_error) = cos r - r_error sin r.
-        # The largest term comes last, so rounding errors stay small.
+        # To first order, sin(r + r_error) = sin r + r_error cos r,
+        # and cos(r + r_error) = cos r - r_error sin r.
+        # The largest term is added last, so rounding errors stay small.
         sine = build_fma(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(r_error, leading))
         sine = builder.fadd(r, sine)
         rest = build_fma(builder, builder.fmul(z, z), polynomial(z, COSINE), leading_error)
@@ -104,9 +98,8 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
-        # An odd number of quarter turns exchanges sine and cosine.
-        # k: number of quarter turns modulo 4.
-        # k = 2 or 3: -sine. k = 1 or 2: -cosine.
+        # An odd number of quarter turns exchanges sine and cosine. Let k be the number of quarter turns
+        # modulo 4. The sine changes its sign if k is 2 or 3, and the cosine if k is 1 or 2.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             apply_sign(builder.select(odd, cosine, sine), quarters),

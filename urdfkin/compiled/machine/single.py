@@ -1,9 +1,9 @@
 """Make compiled functions that compute a quantity for one configuration.
 
 Python calls a compiled function like a built-in function: CPython passes the arguments' addresses without a
-check. An argument check in Numba would take as long as the recursion. The compiled function reads 8-byte
-words of each array object. CPython and NumPy guarantee the offsets of these words. The function holds
-Python's global interpreter lock for about a microsecond.
+check. Checking the arguments in Numba would take as long as the recursion itself. The compiled function reads
+8-byte words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function
+holds Python's global interpreter lock for about a microsecond.
 
 An atomic flag protects the scratch memory, even in a Python without a global interpreter lock.
 
@@ -48,15 +48,13 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
     int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
 
-#: Number of 8-byte words of a Python object's header.
+#: Number of 8-byte words in a Python object's header.
 _HEADER_WORDS = object.__basicsize__ // 8
-#: A Python object consists of 8-byte words.
-#: Word `_TYPE`: address of the object's type.
-#: Word `_ITEMS` of a tuple: address of the first item.
+#: A Python object consists of 8-byte words. Word `_TYPE` contains the address of the object's type. In a
+#: tuple, word `_ITEMS` contains the address of the first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
-#: Indices of 8-byte words of a NumPy array (PyArrayObject_fields).
-#: Lower four bytes of `_NDIM`: number of axes.
-#: Lower four bytes of `_FLAGS`: flags.
+#: Indices of 8-byte words of a NumPy array (C structure PyArrayObject_fields). The lower four bytes of
+#: `_NDIM` contain the number of axes. The lower four bytes of `_FLAGS` contain the flags.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS,
     _HEADER_WORDS + 1,
@@ -64,10 +62,9 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS + 5,
     _HEADER_WORDS + 6,
 )
-#: Words of PyArray_Descr, the type of an array's elements.
-#: `_KIND_AND_ORDER` contains the byte order and the type number.
-#: `_NATIVE` is the native byte order.
-#: `_DOUBLE` is the type number of doubles.
+#: The C structure PyArray_Descr describes the type of an array's elements. The word `_KIND_AND_ORDER`
+#: contains the byte order and the type number. `_NATIVE` is the native byte order. `_DOUBLE` is the type
+#: number of doubles.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _FOUR_BYTE_MASK, _BYTE_MASK = 0xFFFFFFFF, 0xFF
 #: `_READABLE` has NumPy's flags of an input array: C-contiguous and aligned.
@@ -112,7 +109,7 @@ def _clear_flag(context: Any, numbers: Any, index: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles; 0 for unsupported arrays.
+    """Return the address of the doubles, or 0 if the array is not supported.
 
     The array must have `axes` axes and the shape (rows, columns, columns, ...).
     """
@@ -132,8 +129,8 @@ def _doubles_address(array, ndarray, flags, axes, rows, columns):
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration.
 
-    `arguments` is the address of `count` arguments. The order is q, optional v and a, the output array or
-    None. `bound` is the address of a tuple:
+    `arguments` is the address of `count` arguments: (q), (q, v) or (q, v, a), then the output array or None.
+    `bound` is the address of a tuple:
 
     | Item of `bound` | Object |
     |---|---|
@@ -162,7 +159,7 @@ def one_configuration(bound, arguments, count):
 
 @inline
 def _compute_into(address, inputs, to, ndarray):
-    """Write the result to `to`, and return True for a valid result."""
+    """Write the result to `to`, and return whether the result is valid."""
     args = integers_at(address)
     orders, rows, columns, width = args[_ORDERS], args[_ROWS], args[_COLUMNS], args[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, args[_AXES], rows, columns)
@@ -201,10 +198,7 @@ _BUILTIN_CONSTRUCTOR = ctypes.PYFUNCTYPE(
 
 
 def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Make a function from machine code.
-
-    The function keeps `bound` alive.
-    """
+    """Make a function from machine code; the function keeps `bound` alive."""
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _BUILTIN_CONSTRUCTOR(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
@@ -227,9 +221,9 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: First kernel: WORLD and LOCAL_WORLD_ALIGNED. Second kernel: LOCAL.
-#: First number: number of inputs (q, v, a).
-#: Second number: number of array axes of length nv.
+#: The first kernel computes the quantity in WORLD and LOCAL_WORLD_ALIGNED, the second kernel in LOCAL. The
+#: first number is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a. The second number counts
+#: the array axes of length nv: 1 for a Jacobian, 2 for a Hessian.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -242,10 +236,10 @@ _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
 def make_single_evaluator(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Make a function for one configuration.
+    """Make a function for one configuration; the base is fixed at the world's origin.
 
-    The base is fixed at the world's origin. `plan` must have one frame. The returned array contains the
-    kernel's arguments. Element `KernelArgs.COUNT` counts the valid results.
+    `plan` must have one frame. The returned array contains the kernel's arguments; its element
+    `KernelArgs.COUNT` counts the valid results.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
@@ -263,7 +257,7 @@ def make_single_evaluator(
 def wrap_c_function(
     c_function: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Like `make_single_evaluator`, but with a C function instead of a kernel."""
+    """Make a function as `make_single_evaluator` does, from a C function instead of a kernel."""
     address = ctypes.cast(c_function, ctypes.c_void_p).value
     return _make_evaluator(address or 0, orders, shape, plan, c_function)
 
@@ -273,7 +267,7 @@ def _make_evaluator(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     args = np.zeros(len(KernelArgs), dtype=np.int64)
     args[KernelArgs.KERNEL], args[KernelArgs.ORDERS], args[KernelArgs.N] = address, orders, 1
-    # The arrays contain one configuration, so all strides remain 0.
+    # All strides remain 0, because the arrays contain one configuration.
     args[KernelArgs.NQ], args[KernelArgs.NV] = plan.nq, plan.nv
     args[KernelArgs.AXES], args[KernelArgs.ROWS], args[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = args, np.ndarray, None, np.empty, shape, *alive

@@ -1,1 +1,1 @@
-"""Reference values: numbers with fifty digits, or intervals around true values."""
+"""Reference values: quantities computed with fifty digits, or as intervals that contain the true value."""

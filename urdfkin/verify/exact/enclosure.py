@@ -37,8 +37,8 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, compute_oracle_results, compute_own_results
 
-#: Different decimals of 15 digits are different doubles.
-#: The maximum limits the computing time.
+#: Minimum and maximum number of decimal digits of the intervals. Different decimals of 15 digits are
+#: different doubles. The maximum limits the computing time.
 MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
 _round_ends = np.vectorize(interval_ends, otypes=[float, float])
@@ -50,7 +50,7 @@ class Enclosure:
 
     Attributes:
         urdfkin: urdfkin's result.
-        pinocchio: None if Pinocchio has no result.
+        pinocchio: Pinocchio's result, or None if Pinocchio has no result.
     """
 
     quantity: str

@@ -1,8 +1,8 @@
 """Interval arithmetic, and a reader of the exact decimals of a URDF text.
 
 An interval consists of a midpoint with many digits, and a radius. The library Arb (python-flint) guarantees
-that each result contains the true value. The guarantee covers sums, products, quotients, roots, sines and
-cosines. Vectors are triples of intervals.
+that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
+triples of intervals.
 
 `read_exact_joints` reads the decimals of a URDF text without rounding them. `urdfkin.urdf.lint` has already
 checked the text.
@@ -30,19 +30,18 @@ from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Digits of reference values; long paths need more (`enough_digits`).
-#: A double has about 16 digits.
-#: 50 digits are enough to measure rounding errors of doubles.
+#: Number of decimal digits of reference values; long paths need more (`enough_digits`). A double has about 16
+#: digits, so 50 digits are enough to measure the rounding errors of doubles.
 REFERENCE_DIGITS = 50
-#: Digits of intervals on a path without joints (`enough_digits`).
+#: Number of decimal digits of intervals on a path without joints (`enough_digits`).
 _BASE_DIGITS = 30
 _BITS_PER_DIGIT = math.log2(10.0)
-#: Intervals of 15 digits have 50 + 5 = 55 bits.
-#: With 53 bits, an interval could span four spacings of doubles.
+#: Additional bits for each number of digits. An interval of 15 digits has 50 + 5 = 55 bits. With 53 bits, an
+#: interval could be four times as wide as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
 #: A decimal of 17 digits determines every double.
 _SIGNIFICANT_DIGITS = 17
-#: Digits in `format_decimal` before the rounding to 17 digits.
+#: Number of digits in `format_decimal` before the result is rounded to 17 digits.
 _INTERMEDIATE_DIGITS = 200
 #: Additional bits of precision for the Newton steps in `nearest_rotation`.
 _NEWTON_BITS = 30
@@ -51,10 +50,10 @@ _precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joint_count: int) -> int:
-    """Return the number of digits for intervals narrower than a double's last digit.
+    """Return the number of digits that makes an interval narrower than the last digit of a double.
 
-    A joint with an oblique axis makes an interval about twice as wide. Therefore, each joint adds one digit.
-    One digit makes the interval ten times narrower.
+    A joint with an oblique axis makes an interval about twice as wide. Each joint therefore adds one digit,
+    which makes the interval ten times narrower.
     """
     return _BASE_DIGITS + joint_count
 
@@ -63,7 +62,7 @@ def enough_digits(joint_count: int) -> int:
 def precision(digits: int) -> Iterator[None]:
     """Compute with `digits` decimal digits inside a `with` block.
 
-    Arb has one global precision. Therefore, only one thread at a time executes the block.
+    Arb has one global precision, so only one thread at a time can execute such a block.
     """
     with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
@@ -76,7 +75,7 @@ def as_interval(value: Number) -> Number:
 
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return both ends, rounded outward to doubles."""
-    # Usually, x is the integer 0.
+    # This shortcut saves time, because x is usually the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
@@ -89,11 +88,11 @@ def _round_outward(end: arb, towards: float) -> float:
 
 
 def format_decimal(x: Number, negligible: float) -> str | None:
-    """Return an interval's midpoint as a decimal of 17 digits. None: the interval is too wide.
+    """Return an interval's midpoint as a decimal of 17 digits, or None if the interval is too wide.
 
-    An interval with 0 is too wide if its radius > 1e-10 `negligible`. Otherwise, its decimal is "0". An
-    interval without 0 is too wide if its radius > 1e-20 |midpoint|. Otherwise, the decimal's error is at most
-    0.501 units of the last digit.
+    An interval that contains 0 is too wide if its radius is above 1e-10 `negligible`. Otherwise, its decimal
+    is "0". Any other interval is too wide if its radius is above 1e-20 |midpoint|. Otherwise, its decimal
+    differs from the true value by at most 0.501 units of the last digit.
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
@@ -187,7 +186,7 @@ def _compute_gram_residual(M: Matrix) -> Matrix:
     return x, y, z
 
 
-#: First URDF version with the attribute `quat_xyzw`.
+#: First URDF version with the attribute `quat_xyzw`; older versions ignore it.
 _FIRST_QUATERNION_VERSION = (1, 1)
 
 
@@ -224,8 +223,7 @@ def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: Fl
     return _ExactText(text).conversion_errors(tree, path, q)
 
 
-# Parsing a large URDF is slower than computing one sample.
-# The latest URDF is therefore cached.
+# The last URDF is cached, because parsing a large URDF is slower than computing one sample.
 @lru_cache(maxsize=1)
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = INTERVALS) -> None:
@@ -283,7 +281,7 @@ class _ExactText:
         return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
     def resolve_rule(self, name: str) -> tuple[Number, Number]:
-        """Return (M, C). The joint's value is M q + C for the independent joint's q."""
+        """Return M and C so that the joint's value is M q + C for the independent joint's q."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -346,7 +344,7 @@ class _ValueBound(NamedTuple):
     Attributes:
         scaled_coordinate: |M q|.
         offset: Sum of the absolute values of the terms of C.
-        error: Rounding error (eps) of a program that applies one rule after another.
+        error: Rounding error, in eps, of a program that applies the rules one after the other.
     """
 
     scaled_coordinate: Any

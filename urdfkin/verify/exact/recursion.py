@@ -1,8 +1,8 @@
-"""The forward recursion of section 7.7, computed with intervals.
+"""The forward recursion of section 7.7, computed with intervals that contain the true values.
 
-The intervals contain the true values for the URDF's decimals and exact q, v and a. The equations come from
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure only rounding errors.
-The comparison with Pinocchio checks the equations.
+The inputs are the URDF's decimals and the exact values of q, v and a. The equations come from
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure only rounding errors;
+the comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from urdfkin.verify.oracle import BaseMotionLike
 
 _RECURSION = Recursion(equations)
 
-#: Each velocity has a pair (axis, is_angular).
-#: Axes of the child link: 0 = x, 1 = y, 2 = z.
+#: Axis and type of each velocity of a planar or floating joint. A pair contains the index of an axis of the
+#: child link (0, 1 or 2 for x, y or z), and True for an angular velocity.
 _VELOCITY_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -126,7 +126,7 @@ def acceleration_values(motion: ExactMotion, link: int, reference: Reference) ->
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the spatial acceleration.
 
-    Linear part: acc - w x vel. For WORLD: acc - w x vel - alpha x p.
+    The linear part is acc - w x vel, or acc - w x vel - alpha x p for WORLD.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
@@ -148,7 +148,7 @@ def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -
 def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # NumPy has no product of an interval and an array.
+        # NumPy cannot multiply an interval by an array.
         out[of, by] += _as_array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
