@@ -21,8 +21,7 @@ CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 #: command only at the beginning of a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: Invisible character (word joiner).
-#: The character prevents Markdown links, mentions and issue numbers.
+#: Invisible character (word joiner) that prevents Markdown links, mentions and issue numbers.
 _WORD_JOINER = "&#8288;"
 
 

@@ -5,7 +5,7 @@ rotates about z_{i-1}, and a prismatic joint translates along z_{i-1}. The vecto
 to O_i. The path may lead from parent to child, from child to parent, or through a common ancestor. An example
 is the path from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path
 passes a joint from child to parent, the joint's axis is reversed. The coordinate q then keeps the sign of the
-URDF, because the inverse of a rotation by q about z is a rotation by q about -z.
+URDF, because the inverse of a rotation by q about z rotates by q about -z.
 """
 
 from __future__ import annotations

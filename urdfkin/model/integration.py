@@ -3,8 +3,8 @@
 For a configuration q with orientations, q + v is meaningless. Use `integrate` and `difference` instead of +
 and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
 `integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns,
-unless a full turn moves a mimic joint. For a planar or floating joint, the joint velocity (w, s) is constant
-in the moving frame, so that the joint makes a screw motion from the pose (R_0, p_0):
+unless a full turn moves a mimic joint. The joint velocity (w, s) of a planar or floating joint is constant in
+the moving frame. Therefore, the joint makes a screw motion from the pose (R_0, p_0):
 
     R = R_0 exp(w)
     p = p_0 + R_0 V(w) s

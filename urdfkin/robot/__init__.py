@@ -88,8 +88,7 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 _RANK_SAMPLES = 3
 #: `dir(robot)` omits these internal members.
 _INTERNAL_NAMES = {"plan", "single", "single_terms", "verifier"}
-#: Maximum number of float64 values in an array.
-#: The number of bytes must fit in 63 bits.
+#: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
 _MAX_NUMBERS = (2**63 - 1) // 8
 
 

@@ -19,8 +19,7 @@ from urdfkin.system.locks import make_fork_safe_lock
 
 #: Environment variables that a Python interpreter may need to start.
 _INHERITED_VARIABLES = ("LD_LIBRARY_PATH",)
-#: Linear algebra uses a single thread.
-#: A confined process has little address space for threads.
+#: Linear algebra uses a single thread, because a confined process has little address space for threads.
 _EXTRA_VARIABLES = {"OPENBLAS_NUM_THREADS": "1"}
 
 
