@@ -909,7 +909,8 @@ class _VariablesBuilder:
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """Intersect the limits of all joints that a variable moves.
 
-        If the intersection is empty or a single value, the limits in A are the range.
+        If the intersection is empty or a single value, the range is the limits in A.
+        If the variable moves no joint of A, the range is then the limits in B.
         The limits of mimic joints are ignored, because mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}
