@@ -1,13 +1,12 @@
-"""Bound the largest distance between a frame's positions in two models.
+"""Compute lower and upper bounds on the largest distance between a frame's positions in two models.
 
-**Lower bound.** `DistanceSearch` starts at the sampled configurations with the largest distances. The search
-varies one coordinate at a time. The largest distance found is the lower bound.
+**Lower bound.** `DistanceSearch` starts at the sampled configurations with the largest distances, and varies
+one coordinate at a time. The largest distance found is a lower bound.
 
-**Upper bound.** The models differ in several places. `urdfkin.model.mechanisms.upper_bound` adds up the
-largest effect of each difference. Each effect can be largest in another configuration. The sum of the effects
-can therefore be far above the largest distance. `tighten` computes a bound below this sum by branch and
-bound. `tighten` divides the ranges of the variables into boxes. In each box, a Taylor polynomial and its
-remainder bound the distance.
+**Upper bound.** `urdfkin.model.mechanisms.upper_bound` adds up the largest effects of all differences between
+the models. These effects can be largest in different configurations, so their sum can be far above the
+largest distance. `tighten` proves a smaller bound by branch and bound. It divides the ranges of the variables
+into boxes, and bounds the distance in each box by a Taylor polynomial and its remainder.
 
     D(q) = p_B - p_A              difference of the frame's positions in B and A
     D_i                           derivative of D with respect to variable i
@@ -19,9 +18,9 @@ remainder bound the distance.
 
     |D(q)| <= max over |x_i| <= h_i of |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
 
-A box is finished if its bound is at most the target. All other boxes are halved along the same variable.
-`tighten` ends when all boxes are finished. The result is then the target. `tighten` also ends at the maximum
-number of boxes. The result is then the largest bound of the unfinished boxes.
+A box is finished if its bound is at most the target. All other boxes are halved along the same variable. If
+all boxes are finished, `tighten` returns the target. If the maximum number of boxes is reached first,
+`tighten` returns the largest bound of the unfinished boxes.
 """
 
 from __future__ import annotations
@@ -47,19 +46,19 @@ from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
-#: Number of uniform random configurations within the joint ranges.
+#: Number of configurations that are sampled uniformly within the joint ranges.
 RANDOM_SAMPLES = 512
 #: Number of random configurations at corners of the joint ranges.
 CORNER_SAMPLES = 128
 #: Number of starting points of the search for one frame.
 STARTING_POINTS = 4
-#: Number of values that one search step tries.
+#: Number of values that one step of the search tries for one coordinate.
 TRIALS_PER_STEP = 13
 FRAMES_PER_BATCH = 24
-#: Search interval / coordinate range, for each search round.
+#: Width of the search interval in each round, as a fraction of the coordinate's range.
 SEARCH_WIDTHS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
-#: (robot, q, frames) -> frame poses (n, frames, 4, 4).
+#: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
 PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
@@ -67,8 +66,8 @@ class DistanceSearch:
     """Search for the largest frame distances.
 
     Args:
-        as_written: True: B's root has a constant pose relative to A's root. False: B's base link has a
-            constant pose relative to A's base link.
+        as_written: True: B's root has a constant pose in A's root frame. False: B's base link has a constant
+            pose in the frame of A's base link.
     """
 
     def __init__(
@@ -84,15 +83,14 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: B's base link in A's root frame, (4, 4).
-        #: A is in its zero configuration.
+        #: (4, 4) pose of B's base link in A's root frame, for A's zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: Whether the base link is on the root body (A, B).
+        #: For A and for B: whether the base link belongs to the same rigid body as the root link.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether joints before the base link change the distances.
-        #: True: `upper_bounds` and `tighten` prove no bound.
+        #: Whether a moving joint between a robot's root and its base link changes the distances. If so, the
+        #: bounds of `upper_bounds` and `tighten` are not valid.
         self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
@@ -112,8 +110,8 @@ class DistanceSearch:
 
         Args:
             z: (n, variables) values of the variables.
-            random_free_joints: True: A's planar and floating joints have random coordinates. False: these
-                coordinates are neutral.
+            random_free_joints: Whether A's planar and floating joints have random coordinates instead of
+                neutral ones.
 
         Returns:
             (n, nq) configurations of both robots.
@@ -139,10 +137,9 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Return whether `q_a` and `q_b` are corresponding configurations of A and B.
+        """Return whether `q_a` (1, nq) of A and `q_b` (1, nq) of B are corresponding configurations.
 
-        The shape of `q_a` and of `q_b` is (1, nq). Each variable must be within its range in `ends`. A's
-        planar and floating joints must be neutral.
+        Each variable must be within its range in `ends`. A's planar and floating joints must be neutral.
         """
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
@@ -165,9 +162,7 @@ class DistanceSearch:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the frame poses (n, frames, 4, 4) of A and of B.
-
-        All poses are in A's root frame.
+        """Return poses (n, frames, 4, 4) of A's frames and of B's frames, all in A's root frame.
 
         B's poses do not include the transform `FramePair.tool`.
         """
@@ -200,7 +195,7 @@ class DistanceSearch:
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sample_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n, frames), m, and the sampled variables (n, variables)."""
+        """Return distances (n, frames), m, and the sampled values (n, variables) of the variables."""
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
         corners = np.where(self.rng.random((CORNER_SAMPLES, len(self.names))) < 0.5, low, high)
@@ -249,7 +244,7 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(best_start)]
 
     def _distances_per_frame(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distance (m) of each frame k at the variables `z[k]`.
+        """Return the distance (m) of each frame k at the values `z[k]` of the variables.
 
         The shape of `z` is (frames, starting points, trials, variables).
         """
@@ -288,12 +283,10 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
-#: Maximum number of boxes in memory.
-#: `tighten` takes one or two seconds per frame with `MAX_BOXES`.
+#: Maximum number of boxes in memory. With this number of boxes, `tighten` takes one or two seconds per frame.
 MAX_BOXES = 2**17
-#: Number of boxes in one batch.
-#: The Jacobians take 48 bytes per box and coordinate.
-#: All 2^22 boxes of `recheck` together would take gigabytes.
+#: Number of boxes in one batch. The Jacobians take 48 bytes for each box and coordinate. The 2^22 boxes of
+#: `recheck` would take gigabytes in one batch.
 BOXES_PER_BATCH = 2**16
 
 
@@ -315,7 +308,7 @@ class BoxBounds:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: d(coordinate) / d(variable): one (nv, variables) array for each robot.
+        #: Derivatives of each robot's coordinates with respect to the variables: two (nv, variables) arrays.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
@@ -344,10 +337,7 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and D_i (n, 3, variables) at the box centers.
-
-        `c` (n, variables) are the box centers.
-        """
+        """Return D (n, 3) and its derivatives D_i (n, 3, variables) at the box centers c (n, variables)."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -359,10 +349,7 @@ class BoxBounds:
     def _position_and_jacobian(
         self, robot: Robot, q: FloatArray, frame: str, point: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return a point's position (n, 3) and Jacobian (n, 3, nv).
-
-        `point` (3,) is given in `frame`.
-        """
+        """Return the position (n, 3) and the Jacobian (n, 3, nv) of `point` (3,), given in `frame`."""
         inputs = _plan_and_q(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not point.any():
@@ -389,8 +376,8 @@ def tighten(
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     moving_pairs = [pair for pair in pairs if pair is not None]
-    # Boxes cover one turn of an unlimited variable.
-    # A revolute joint with multiplier ±1 then reaches all poses.
+    # Boxes over one turn cover an unlimited variable only if its joints are revolute and have the multiplier
+    # 1 or -1. Such a joint repeats its poses after one turn of the variable.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, moving_pairs, strict=False)
@@ -427,7 +414,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Count the halvings until (1/2) sum_ij M_ij h_i h_j < `upper`."""
+    """Count the halvings of box widths until (1/2) sum_ij M_ij h_i h_j is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

@@ -1,4 +1,4 @@
-"""Write the result of `urdfkin same` as a certificate, and check a certificate."""
+"""Write the result of `urdfkin same` as a certificate, and check a certificate against two models."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ from urdfkin.verify.oracles import PINOCCHIO, package_versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative and absolute (m or rad) tolerance of certified numbers.
-#: Two machines can make different rounding errors.
+#: Relative tolerance of the numbers in a certificate, and absolute tolerance (m or rad) near zero. The
+#: tolerances allow for different rounding errors on the machine that wrote the certificate.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
-#: Relative tolerance of a bound / machine epsilon.
+#: The relative tolerance of a bound is this number times the machine epsilon.
 _BOUND_TOLERANCE = 64.0
-#: Entries that `recheck` computes again.
+#: `recheck` computes these entries again, and compares the results with the certificate.
 RECOMPUTED_ENTRIES = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -259,7 +259,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", as_json_data(document))
 
 
-#: `Sameness` attributes that the certificate copies.
+#: The certificate copies these attributes of `Sameness`, under the same names.
 _COPIED_ATTRIBUTES = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",
@@ -278,15 +278,15 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    The joints are matched as in the certificate. If the verdict is "differs", `recheck` compares the models
-    again. The second comparison matches the joints like `same` without the argument `map`. The second verdict
+    `recheck` matches the joints as in the certificate. If the verdict is "differs", `recheck` compares the
+    models a second time, and matches the joints like `same` without the argument `map`. The second verdict
     must also be "differs".
 
     Returns:
         A line for each statement that is wrong or not proven.
 
     Raises:
-        InputError: the certificate belongs to other models, or names an unknown joint or link.
+        InputError: the certificate was made for other models, or names an unknown joint or link.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -442,10 +442,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Return whether two entries are equal up to rounding.
-
-    `zero` is the absolute tolerance.
-    """
+    """Return whether two entries are equal up to rounding, with the absolute tolerance `zero`."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -497,7 +494,7 @@ def _interval_errors(
 ) -> Iterator[str]:
     """Yield an error for each wrong or unproven bound.
 
-    `rounding` contains rounding errors (m, rad).
+    `rounding` is the largest distance (m) and angle (rad) that rounding can cause.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:

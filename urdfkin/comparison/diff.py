@@ -1,4 +1,4 @@
-"""List the changes between two versions of a robot, and bound frame displacements.
+"""List the changes between two versions of a robot description, and bound the displacements of frames.
 
 Two files of the same format are compared attribute by attribute. Two MJCF files or two USD files are first
 converted to URDF. For files of different formats, `diff` lists the differences that `same` finds.
@@ -83,10 +83,7 @@ class ModelChange:
 
 
 def format_value(value: Value | None) -> str:
-    """Return a value as text.
-
-    The text of a number gives exactly this number again.
-    """
+    """Return a value as text from which a number can be read back exactly."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
@@ -100,7 +97,7 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Effect of one changed joint or link. The other joints and links are unchanged.
+    """Effect of one changed joint or link, while all others are unchanged.
 
     Attributes:
         element: The changed element, for example "joint elbow".
@@ -124,16 +121,17 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes. If the formats are equal, the order is: robot name, joints, links.
-        effects: One effect for each changed joint or link that moves frames. All other joints and links are
-            unchanged. Some effects cannot be computed and are missing. Examples are a new joint, and a joint
+        changes: The changes. For versions of the same format, a change of the robot's name comes first, then
+            changes of joints, then changes of links.
+        effects: Effect of each changed joint or link that moves frames, while all others are unchanged. An
+            effect that cannot be computed is missing, for example the effect of a new joint, or of a joint
             with another parent link. Empty if the argument `effects` is False.
-        total: The matching frame that all changes together move farthest. None if no listed change moves a
-            matching frame. Also None if the argument `effects` is False.
-        rounding: Proven bounds on the distance (m) and the angle (rad) between matching frames. The bounds
-            exist only for the verdict `UP_TO_SINGLE`: single precision explains every difference in motion.
-            `changes` does not list these differences. Infinite without a proof, for example if the argument
-            `effects` is False. None for every other verdict of `same`, and for equal formats.
+        total: The matching frame with the largest displacement by all changes. None if no listed change moves
+            a matching frame, or if the argument `effects` is False.
+        rounding: Proven bounds on the distance (m) and the angle (rad) between matching frames, if single
+            precision explains every difference in motion. `changes` does not list these differences. Infinite
+            if no bounds were proven, for example if the argument `effects` is False. None if the formats are
+            equal, or if the verdict of `same` is not `UP_TO_SINGLE`.
     """
 
     sources: tuple[str, str]
@@ -155,8 +153,8 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     """List the changes between two versions of a robot description.
 
     Versions of the same format are compared attribute by attribute. If the formats differ, for example URDF
-    and MJCF, `diff` lists the differences that `same` finds. `diff` then gives matched joints and links the
-    names of the old version.
+    and MJCF, `diff` lists the differences that `same` finds. For matched joints and links, `diff` then uses
+    the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -240,7 +238,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _changes_with_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield the differences of `same`, unless joints can be compared one by one."""
+    """Yield the differences that `same` finds, if the joints cannot be compared one by one."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -309,10 +307,7 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Return {name: attribute}, with a joint's default values.
-
-    A name is, for example, "origin x".
-    """
+    """Map names such as "origin x" to attributes, including a joint's default values."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -344,10 +339,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of one changed joint.
-
-    Return None if the effect is zero or cannot be computed.
-    """
+    """Return the effect of one changed joint, or None if the effect is zero or cannot be computed."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

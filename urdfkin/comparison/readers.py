@@ -1,7 +1,7 @@
-"""Compare how libraries read a robot file: joints, joint order and link poses.
+"""Compare how other libraries read a robot file: the joints, their order, and the link poses.
 
-Each library runs in a separate process. `urdfkin/verify/adapters.py` contains the adapters. For each
-joint, urdfkin compares the child link's pose in the parent link's frame.
+Each library runs in a separate process, with its adapter in `urdfkin/verify/adapters.py`. A joint counts as
+different if its child link has a different pose in the parent link's frame.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Tolerance of pose entries, relative to max(1, largest entry).
-#: Libraries with double precision differ by less than 1e-13.
+#: Tolerance for the entries of poses, relative to max(1, largest entry). Libraries that compute in double
+#: precision differ by less than 1e-13.
 _TOLERANCE = 1e-9
 #: Tolerance for libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
-#: Time limit for one library's process, seconds.
+#: Time limit for the process of one library, in seconds.
 _TIMEOUT = 60.0
-#: Maximum size of the output of a library's process, bytes.
+#: Maximum number of bytes that a library's process may return.
 _MAX_BYTES = 400_000_000
 #: Maximum length of a library's error message, in characters.
 _MAX_CHARACTERS = 200
@@ -45,8 +45,8 @@ class ReaderDifference:
     """A joint with another pose or motion in a library's model.
 
     Attributes:
-        size: Largest difference between an entry of urdfkin's pose and of the library's pose. The pose is
-            that of the child link in the parent link's frame.
+        size: Largest difference between matching entries of two matrices: urdfkin's pose and the library's
+            pose of the child link in the parent link's frame.
     """
 
     joint: str
@@ -61,10 +61,10 @@ class LibraryReading:
 
     Attributes:
         refused: Reason why the library does not read the file. None if the library reads the file.
-        missing: Links that the library's model lacks. For a USD file, only links with a prim (USD object) are
-            listed. A root link that `load` added is not listed.
-        worst: Largest difference between matching entries of link poses. The poses are in the frame of the
-            first common link. 0 if rounding can explain the difference.
+        missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
+            the USD file) are listed. A root link that `load` added is not listed.
+        worst: Largest difference between matching entries of the link poses in the frame of the first common
+            link. 0 if rounding can explain the difference.
     """
 
     library: str
@@ -93,14 +93,14 @@ def compare_readers(
 ) -> tuple[LibraryReading, ...]:
     """Compare how urdfkin and other libraries read a robot's file.
 
-    The default is every installed library that reads the file's format. The poses of all common links are
-    compared. The configurations are the neutral one and `samples` random ones.
+    By default, all installed libraries that read the file's format are used. The poses of all common links
+    are compared, in the neutral configuration and in `samples` random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
         InputError: a library is not installed, or no installed library reads the file's format. Also if the
-            robot has a locked joint, or is from MJCF text instead of a file. Also for a USD file with a
-            selected variant or articulation.
+            robot has a locked joint, or was loaded from MJCF text instead of a file. Also if a variant or an
+            articulation of a USD file was selected.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)
@@ -137,10 +137,7 @@ def joint_values(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _compare_reader(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Compare a library's link poses with urdfkin's poses `ours`.
-
-    The shape of `ours` is (configurations, links, 4, 4).
-    """
+    """Compare a library's link poses with urdfkin's link poses `ours` (configurations, links, 4, 4)."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -163,8 +160,8 @@ def _compare_reader(
             title, number, "its model contains none of the robot's links", tuple(answer["joints"])
         )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
-    # `load` may add a root joint to the text's joints.
-    # So the poses are relative to the first common link.
+    # `load` may add a root joint that the text does not contain. Therefore, the compared poses are relative
+    # to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())
@@ -188,10 +185,7 @@ def _compare_reader(
 
 
 def _library_input(robot: Robot) -> tuple[str, str]:
-    """Return the library's input and the input's format, for example "urdf".
-
-    For URDF, the input is the text. For MJCF and USD, the input is the path of the file.
-    """
+    """Return the URDF text, or the path of the MJCF or USD file, and the format, for example "urdf"."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -255,12 +249,10 @@ def _find_cause(
     shared_joints: Sequence[str],
     tolerance: float,
 ) -> tuple[str, str]:
-    """Return the cause of a difference and a description.
+    """Return the cause of a difference, for example "origin rpy" or "axis", and a description.
 
-    The cause is, for example, "origin rpy" or "axis".
-
-    `T` and `T_theirs` are urdfkin's and the library's poses (n, 4, 4). The pose is that of the child link in
-    the parent link's frame. The first pose belongs to the neutral configuration.
+    `T` and `T_theirs` are urdfkin's and the library's poses (n, 4, 4) of the child link in the parent link's
+    frame. The first pose belongs to the neutral configuration.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

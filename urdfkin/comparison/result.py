@@ -57,11 +57,10 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes to B.
-#: Models are equivalent if these changes remove all differences.
-#: The order is that of the printed verdict.
+#: Kinds of changes to B. The models are equivalent if changes of these kinds remove all differences. The
+#: order is that of the printed verdict.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
-#: Kinds of differences with an upper bound on frame distances.
+#: For these kinds of differences, `same` computes an upper bound of the distance between matching frames.
 BOUNDED_DIFFERENCE_KINDS = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
@@ -108,13 +107,11 @@ class Interval:
     q_b: tuple[float, ...]
 
 
-#: Value of a parameter of a joint or link.
-#: A type or a name is a str. A limit of velocity or effort is a float.
-#: "limits": (lower limit, upper limit).
-#: "idle": (joint type, constant joint value in rad or m).
-#: "only in A", "only in B": names of links.
-#: A `Mimic` is a mimic rule.
-#: None: the joint or link lacks this parameter.
+#: Value of a parameter of a joint or link. A type or a name is a str. A limit of velocity or effort is a
+#: float. For "limits", a tuple contains the lower and the upper limit. For "idle", a tuple contains the type
+#: of a joint that never moves, and the joint's value (rad or m). For "only in A" and "only in B", a tuple
+#: contains the names of links. A `Mimic` is a mimic rule. None: the joint or link has no value of this
+#: parameter.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -226,7 +223,7 @@ def _format_range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference that rounding does not explain, or an incomparable joint or link.
+    """A difference that rounding does not explain, or a joint or link that cannot be compared.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
@@ -262,9 +259,8 @@ class Tool:
     pose: FloatArray
 
 
-#: Result of Pinocchio's check of the bounds.
-#: "not asked": no check was requested, or no bound exists.
-#: "not verified": Pinocchio could not check the bounds.
+#: Result of Pinocchio's check of the bounds. "not asked" means that the user requested no check, or that
+#: there is no bound to check. "not verified" means that Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _STATE_TEXTS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
@@ -303,7 +299,8 @@ class JointMap:
     Attributes:
         sense: 1 or -1; 1 for planar and floating joints.
         offset: Offset in rad or m; 0 for planar and floating joints.
-        conversion: Conversion of a planar or floating joint's pose from A to B. None without a conversion.
+        conversion: Conversion of a planar or floating joint's pose from A to B. None if the pose needs no
+            conversion.
     """
 
     a: str
@@ -327,35 +324,34 @@ class Sameness(Displayable):
         after: Changes of B that bring B closest to A, one line each. The models may still differ after the
             changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
-        differences: The differences, ordered from the base to the tips. The last entries are joints of only
-            one model, and links after different moving joints.
-        remarks: Differences without effect on motion. Examples are joint limits, joint types, and links of
+        differences: The differences, ordered from the base to the tips. The list ends with the joints of only
+            one model, and the links after different moving joints in A and B.
+        remarks: Differences without effect on motion, for example joint limits, joint types, and links of
             only one model.
         joints: Pairs of matching joints of A and B.
         links: Pairs of matching links of A and B.
         tools: Pairs of matching links that `same` reports as different tools.
-        orders: Each entry lists consecutive joints of B in a new order. The new order does not affect the
-            motion.
+        orders: Each entry lists consecutive joints of B in a new order, which does not affect the motion.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The identity if the roots
             coincide.
         base_links: A link of A and a link of B, on matching rigid bodies. The comparison uses poses relative
             to these two links.
-        rounding: (m, rad) bounds on distance and angle between matching frames, due to rounding errors.
-        unlimited: Planar and floating joints of A, and prismatic joints without limits. Bounds on distances
-            assume that these joints travel at most 10 m.
-        single: (m, rad) bounds on distance and angle between matching frames, due to single precision. None
-            if no file has single precision.
-        unexplained: For joints and links of the unchanged models: differences that rounding does not explain.
-            The numbers of a USD file are rounded to single precision.
+        rounding: (m, rad) largest distance and angle that rounding errors can cause between matching frames.
+        unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
+            distances assume that no joint in this list travels more than 10 m.
+        single: (m, rad) largest distance and angle that single precision can cause between matching frames.
+            None if no file has single precision.
+        unexplained: Differences between the unchanged models that rounding does not explain, for each joint
+            and link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`. Empty if
             `same` was called with `bounds=False`.
-        as_written: Interval of the matching frames that are farthest apart in the unchanged models. None if
-            `after` is empty, if no frames can be compared, or if `bounds` is False.
+        as_written: Interval of the two matching frames with the largest distance found between the unchanged
+            models. None if `after` is empty, if no frames can be compared, or if `bounds` is False.
         bound_as_written: (m, rad) proven bounds on distance and angle between matching frames of the
-            unchanged models. Infinite without a proof. If `after` is not empty, a comparison with a
-            Denavit-Hartenberg table uses only the table's base and tip. Their names are equal in A and B.
-        narrowed: One line for each mimicked joint that can move a mimic joint beyond limits. The distances in
-            `frames` include the whole range of the mimicked joint.
+            unchanged models. Infinite if no bounds were proven. If `after` is not empty, a comparison with a
+            Denavit-Hartenberg table uses only the table's base and tip.
+        narrowed: One line for each mimicked joint that can move a mimic joint beyond its limits. The
+            distances in `frames` are computed for the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
 
@@ -427,9 +423,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval of the frame that differs most between the unchanged models.
-
-        The joint values of A and B are equal.
+        """The interval of the frame that differs most between the unchanged models, at equal joint values.
 
         If `as_written` is None, the result is `worst`.
 
@@ -456,9 +450,9 @@ class Sameness(Displayable):
     def within_single(self) -> bool:
         """Whether single precision can explain the displacement of every frame.
 
-        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A small
-        wrong number can also cause a displacement below the limit. Only `up_to_single` proves that rounding
-        is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
+        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
+        small wrong number in a file can also cause a displacement below the limit. Only `up_to_single`
+        proves that rounding is the cause. The result is False unless the verdict is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -474,12 +468,12 @@ class Sameness(Displayable):
         )
 
     def within(self, most: float) -> bool:
-        """Return whether all matching frames provably differ by at most `most` (m and rad).
+        """Return whether all matching frames are proven to differ by at most `most` (m and rad).
 
         The unchanged models are compared at equal coordinates. Different base poses, tool frames and joint
-        zeros can therefore increase the distance. The roots coincide, unless a root body has a link with the
-        name of the other root. Then this link and the other root coincide. Differences outside
-        `BOUNDED_DIFFERENCE_KINDS`, such as "only in A", give False.
+        zeros can therefore increase the distance. If a root body has a link with the name of the other
+        model's root, this link and the other root coincide. Otherwise, the roots coincide. If `differences`
+        contains a kind outside `BOUNDED_DIFFERENCE_KINDS`, such as "only in A", the result is False.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -521,9 +515,9 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
-        Let the models be equivalent. At q (A) and at the result (B), the link poses differ only by `base` and
-        `tools`. Coordinates that only B has are neutral. If a joint is revolute in one model and prismatic
-        in the other, its coordinate is also neutral.
+        For equivalent models, the link poses of A at q and of B at the result differ only by `base` and
+        `tools`. Coordinates that only B has are neutral. If a joint is revolute in one model and prismatic in
+        the other, its coordinate is also neutral.
 
         Raises:
             InputError: q does not have A's length, or is not finite.
@@ -556,8 +550,8 @@ class Sameness(Displayable):
         """Return a convention that converts A's coordinates to B's.
 
         The convention gives A's joints the names, order, directions and zeros of B's joints.
-        `robot_a.convention(found.convention())` converts q, v, a and Jacobians. Let the models be equivalent.
-        The link poses at q and at the converted q then differ only by `base` and `tools`.
+        `robot_a.convention(found.convention())` converts q, v, a and Jacobians. For equivalent models, the
+        link poses at q and at the converted q differ only by `base` and `tools`.
 
         Raises:
             InputError: a coordinate has no match in the other model, or B has no coordinates. Also if the
@@ -610,7 +604,7 @@ class Sameness(Displayable):
             joints=tuple(joints),
             rules=rules,
         )
-        # Check that each joint of A has a coordinate in B.
+        # The constructor raises an error if B lacks a coordinate for a joint of A.
         Conversion(tree_a, "", found)
         return found
 
@@ -677,13 +671,11 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of unchanged B's root in A's root frame.
+    """Return the pose (4, 4) of B's root in A's root frame, for the unchanged models.
 
-    The first true condition determines the pose:
-
-    - B's root body has a link with the name of A's root: this link coincides with A's root.
-    - A's root body has a link with the name of B's root: this link coincides with B's root.
-    - Otherwise, the roots coincide.
+    If B's root body has a link with the name of A's root, this link coincides with A's root. Otherwise, if
+    A's root body has a link with the name of B's root, B's root coincides with this link. Otherwise, the
+    roots coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])
@@ -693,10 +685,10 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
 
 
 def changes_of_b(alignment: Alignment, rounding: Tolerance) -> tuple[tuple[str, str], ...]:
-    """Return (kind, text) for each change in `Sameness.after`.
+    """Return the kind and the text of each change in `Sameness.after`, and store tool poses in `alignment`.
 
-    Tool poses are stored in `alignment`. The convention of a Denavit-Hartenberg table determines the table's
-    frames. Every displaced frame of a table therefore counts as a tool.
+    Every displaced frame of a Denavit-Hartenberg table counts as a tool, because the table's convention
+    determines the frames.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -754,9 +746,9 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance) -> Iterator[tuple[s
 
 
 def _support_link_pairs(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return the index pairs of matching links that support the robots.
+    """Return the index pairs of matching links that support the robots, for example pedestals.
 
-    Pedestals are an example. Matching links beside the robots are included if their poses are equal.
+    Matching links beside the robots are included if their poses are equal.
     """
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
@@ -778,10 +770,10 @@ def _support_link_pairs(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _support_and_side_links(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the root body's supporting links, and its links beside the robot.
+    """Return the links of the root body that support the robot, and those beside the robot.
 
-    A supporting link has a fixed child that carries all moving joints. A pedestal is an example. A link
-    beside the robot, for example a table, carries no moving joint.
+    A supporting link, for example a pedestal, has a fixed child that carries all moving joints. A link beside
+    the robot, for example a table, carries no moving joint.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -822,8 +814,8 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 
 def _are_fixed_end_links(alignment: Alignment, frame: FramePair) -> bool:
-    # `same` fixes some mimic joints with multiplier 0.
-    # The child link of such a joint is no tool.
+    # `same` treats some mimic joints with multiplier 0 as fixed joints. The child link of such a joint is not
+    # a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle_joint_lock(tree.joints[link - 1]):
             return False
@@ -901,10 +893,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _tilt_and_shift(pair: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m).
-
-    A value within the tolerance `rounding` becomes 0.
-    """
+    """Return the tilt (rad) and the shift (m), or 0 for a value within the tolerance `rounding`."""
     return (
         pair.tilt if pair.tilt > rounding.angle else 0.0,
         pair.shift if pair.shift > rounding.distance else 0.0,
@@ -921,8 +910,7 @@ def remarks(
 ) -> tuple[Difference, ...]:
     """Return differences without effect on motion.
 
-    `single_roundoff` is the relative rounding error of single precision. For double
-    precision, `single_roundoff` is 0.
+    `single_roundoff` is the relative rounding error of single precision, or 0 for double precision.
     """
     found = list[Difference]()
     for step in alignment.steps:
@@ -934,9 +922,8 @@ def remarks(
         for lock in filter(None, map(idle_joint_lock, tree.joints)):
             value = lock.joint.kind.value, lock.value
             found.append(Difference(f"joint {lock.joint.name}", "idle", *_value_pair(which, value)))
-    # A mimic joint of A may be independent in B.
-    # The motion can still be the same.
-    # For example, B can have the inverse mimic rule.
+    # A mimic joint of A can be an independent joint in B with the same motion. For example, the mimic rule in
+    # B can be the inverse of the mimic rule in A.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
         line = variables.coordinates_b.get(b.name)
@@ -970,9 +957,9 @@ def limit_differences(
     Args:
         a: The joint of A.
         b: The joint of B.
-        tolerance: Relative tolerance; an absolute tolerance for two values below 1.
+        tolerance: Relative tolerance. For two values below 1, it is an absolute tolerance.
         single_roundoff: Relative rounding error of single precision; 0 for double precision.
-        zero: (sign, offset): value in B = sign * (value in A) + offset.
+        zero: (sign, offset) of the conversion of joint values: value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

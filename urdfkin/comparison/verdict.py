@@ -1,7 +1,4 @@
-"""Decide whether two models are the same robot.
-
-If the models differ, decide whether single precision explains the differences.
-"""
+"""Decide whether two models are the same robot, and whether single precision explains their differences."""
 
 from __future__ import annotations
 
@@ -64,15 +61,14 @@ from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
-#: Number of random configurations that Pinocchio checks.
+#: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMATION_SAMPLES = 8
-#: Maximum number of frames with a bound on `FINE_GRID`.
-#: Also the maximum number of frames in `_farthest_as_written`.
+#: Maximum number of frames with an upper bound on the finer grid `FINE_GRID`. The search for the
+#: largest distance between the unchanged models uses at most this number of frames.
 MAX_REFINED_FRAMES = 4
-#: Maximum length of a path from root to link, m.
-#: Squares of lengths above 1.3e154 overflow.
+#: Maximum length (m) of a path from the root to a link. The squares of lengths above 1.3e154 m overflow.
 MAX_PATH_METRES = 1e150
-#: Stop at: bound <= SHARP_FACTOR * largest distance found.
+#: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
 SHARP_FACTOR = 1.05
 
 
@@ -98,18 +94,18 @@ def same(
     Args:
         a: A robot, or a source for `load`.
         b: The other robot, or a source for `load`.
-        map: {joint name of `a`: name of the matching joint of `b`}. Only joints that urdfkin cannot match by
-            names and axes need an entry.
+        map: Joint names of `a`, each with the name of the matching joint of `b`. Only joints that urdfkin
+            cannot match by names and axes need an entry.
         bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
             most of the time.
         boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
             bounds if the models differ in many places. The value 0 turns off branch and bound.
         within: Limit (m and rad) for `Sameness.within`. If `Sameness.after` is not empty, branch and bound
-            tries to prove this limit.
+            tries to prove that the distances are within this limit.
 
     Returns:
         The verdict, the matched joints and links, and the differences. Each pair of matched links has an
-        interval. The interval contains the largest distance of these links within the joint limits.
+        interval that contains the largest distance of the two links within the joint limits.
 
     Raises:
         UrdfError: a model has errors.
@@ -136,7 +132,7 @@ def same(
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         check_joint_names(robot.tree, list(names), which)
-    # Compiled trees are stored in copies of the user's robots.
+    # The comparison stores compiled trees in the robots, so `same` passes copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -359,10 +355,7 @@ class Comparator:
         )
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Align the unchanged models.
-
-        The joint pairs, joint orders and links are those of `alignment`.
-        """
+        """Align the unchanged models with the joint pairs, joint orders and links of `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -374,8 +367,8 @@ class Comparator:
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
         if not alignment.has_free_frames:
             return list(pairs)
-        # A table's frame poses depend on the Denavit-Hartenberg convention.
-        # So only the table's base and tip are compared.
+        # The convention determines the frames of a Denavit-Hartenberg table. Therefore, only the table's base
+        # and tip are compared.
         tips = alignment.a.table_tip, alignment.b.table_tip
         return [
             (a, b)
@@ -412,7 +405,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the frame displacement (m) and rotation (rad) that rounding causes.
+        """Bound the displacement (m) and the rotation (rad) of frames that rounding can cause.
 
         `same` ignores a small difference at each joint:
 
@@ -495,9 +488,9 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Sharpen the bounds above `target` (m) by branch and bound.
+        """Sharpen the bounds above `target` (m) by branch and bound, the largest bound first.
 
-        The largest bound is sharpened first. The method stops at a bound that stays above `target`.
+        The method stops at the first bound that stays above `target`.
         """
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
@@ -515,7 +508,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_REFINED_FRAMES]]
-        # Without distances above rounding, the angle bound selects the frame.
+        # If all distances are within rounding, the frame with the largest bound on the angle is used.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -535,7 +528,7 @@ class Comparator:
     ) -> Interval:
         """Return a frame's interval.
 
-        `attained` contains the largest distance found (m), and the variables at this distance.
+        `attained` contains the largest distance found (m), and the values of the variables at this distance.
         """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
@@ -606,10 +599,7 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each joint pair that can translate, and the travel (m).
-
-    The travel is infinite without limits.
-    """
+    """Yield each joint pair that can translate, and its travel (m), which is infinite without limits."""
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
             yield step, math.inf
@@ -638,10 +628,7 @@ def _fix_idle_mimic_joints(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
-    """Fix mimic joints of multiplier 0, unless the matching joint moves.
-
-    The fixed joint value is the offset of the mimic rule.
-    """
+    """Fix mimic joints with multiplier 0 at their offsets, unless the matching joint moves."""
     moves = tuple(
         [joint.kind.nv > 0 and not _is_idle_mimic_joint(joint) for joint in one.joints]
         for one in (tree, other_tree)
@@ -660,12 +647,10 @@ def _joints_with_moving_match(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return joint indices of the first tree.
+    """Return the indices of the joints of the first tree that match a moving joint of the second tree.
 
-    Each of these joints matches a moving joint of the second tree.
-
-    Joints match by their names or by their child links. Moving joints with equal names match each other, and
-    no other joint.
+    Joints match by their names or by their child links. Moving joints with equal names do not match other
+    joints by their child links.
     """
     own, other = ([joint.name for joint in tree.joints] for tree in trees)
     own = [names.get(name, name) for name in own]
@@ -710,12 +695,10 @@ def _is_idle_mimic_joint(joint: Joint) -> bool:
 def _match_usd_spellings(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Match the names of a USD model and of another model.
-
-    USD changes the spelling of names.
+    """Match the names of a USD model and of another model, because USD changes the spelling of names.
 
     Returns:
-        The original link names of A and B. A dict from joint names of A to joint names of B.
+        The link names of A and B in the original spelling, and a dict from joint names of A to those of B.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -754,10 +737,10 @@ class JointComparison:
     """Prove joint by joint that single precision causes every difference.
 
     The rounding errors of all joints add up in a frame's pose. A comparison of frame poses can therefore miss
-    a small wrong number. `JointComparison` allows each joint only its own rounding errors.
+    a small wrong number. `JointComparison` allows each joint only the rounding errors of its own numbers.
 
-    **Compared quantities.** Two files can describe the same joint by different frames. The files can also
-    have different fixed links. The compared quantities depend on neither:
+    **Compared quantities.** Two files can describe the same joint by different frames, and can have different
+    fixed links. The compared quantities do not depend on these choices:
 
         common link  a link of A with a matching link of B
         P            nearest ancestor of a common link in A that is also a common link
@@ -819,11 +802,11 @@ class JointComparison:
     - A planar or floating joint is attached to the root body, and is the only joint from P to the link.
     - The frames of a planar or floating joint agree in A and B up to double precision.
 
-    A link that violates a condition is reported as not explained.
+    If a link violates one of these conditions, `same` reports the link as not explained.
 
     Args:
-        errors: Two (joints, 3) arrays, for A and for B. The columns are error bounds: position (m), rotation
-            (rad), mimic rule (relative). The bounds are 0 for double precision.
+        errors: Two (joints, 3) arrays, for A and for B. The columns are error bounds of position (m),
+            rotation (rad) and mimic rule (relative). The bounds are 0 for double precision.
         base: (4, 4) pose of B's root in A's root frame.
     """
 
@@ -864,9 +847,7 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def places_in_second_model(self) -> dict[str, str]:
-        """Map each matched link and joint of the first model to its match.
-
-        A key is, for example, "joint j".
+        """Map each matched link and joint of the first model, for example "joint j", to its match.
 
         Fixed joints match if their child links match.
         """
@@ -882,7 +863,7 @@ class JointComparison:
     def _nearest_common_link(self, link: int) -> tuple[int, list[int]]:
         """Return P and the joints from P to a link.
 
-        Without a common ancestor link, P is `start[0]`.
+        If the link has no common ancestor link, P is `start[0]`.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -893,7 +874,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return two paths from the last common ancestor: to `start`, and to `end`."""
+        """Return the joints from the last common ancestor to `start`, and those to `end`."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -935,8 +916,7 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A wrong link origin shifts the axis relative to P.
-            # Relative to the link, the axis does not shift.
+            # A wrong link origin also shifts the joint axis in the frame of P, but not in the link's frame.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(
@@ -965,8 +945,8 @@ class JointComparison:
             path: Joints from C to the link.
 
         Returns:
-            For each joint of `path`: the screw and its error bounds (m, rad). The link pose. The error bounds
-            (m, rad) of the link pose.
+            The screw and the error bounds (m, rad) of each joint of `path`; the link pose; and the error
+            bounds (m, rad) of this pose.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

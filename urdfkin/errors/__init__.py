@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: `find_similar_names` compares only this number of leading characters.
+#: `find_similar_names` compares at most this number of characters at the start of a name.
 _COMPARED_PREFIX_LENGTH = 128
 MAX_CHARACTER_PAIRS = 1_000_000
 _MAX_SUGGESTIONS = 3
@@ -25,11 +25,11 @@ _MAX_SUGGESTIONS = 3
 def find_similar_names(
     word: str, valid_names: Iterable[str], *, cutoff: float = 0.6, work: int = MAX_CHARACTER_PAIRS
 ) -> list[str]:
-    """Return up to three known names that are similar to `word`.
+    """Return up to three known names that are similar to `word`, the most similar first.
 
-    The most similar name is first. The comparison ignores case. Only the first 128 characters of a name are
-    compared. A returned name has at least the similarity `cutoff`, from 0 to 1. `difflib.get_close_matches`
-    has the same scale. The search compares at most `work` pairs of characters.
+    The comparison ignores case and uses only the first 128 characters of a name. A returned name has at least
+    the similarity `cutoff`, from 0 to 1, as in `difflib.get_close_matches`. The search compares at most
+    `work` pairs of characters.
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
@@ -143,12 +143,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # Names from files must not add lines or terminal commands.
+        # A name from a file must not add lines or terminal commands to the message.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # `validate --jobs` pickles errors.
-        # Python's own `__reduce__` loses keyword arguments.
+        # `validate --jobs` pickles errors, and Python's own `__reduce__` loses keyword arguments.
         return _unpickle_error, (type(self), self.__dict__)
 
 

@@ -18,11 +18,10 @@ from urdfkin.errors.escape import (
     markdown_text,
 )
 
-#: Characters that draw a tree's branches before a name.
+#: Characters that draw the branches of a tree before a name.
 TREE_LINES = "├│└ "
 ASCII_TREE_LINES = str.maketrans("├│└", "+|`")
-#: Up to this fraction, a number is displayed as 0.
-#: The fraction is relative to the table's largest number.
+#: A number is displayed as 0 if it is at most this fraction of the table's largest number.
 NOISE_FRACTION = 1e-15
 
 
@@ -31,8 +30,8 @@ class Table:
     """A table of text and numbers. Numbers are displayed with six digits.
 
     Attributes:
-        left: Number of left-aligned columns, or the indices of these columns. The cells of left-aligned
-            columns keep leading blanks.
+        left: Number of left-aligned columns at the left of the table, or the indices of the left-aligned
+            columns. The cells of these columns keep leading blanks.
         names: Indices of columns that Markdown displays as code.
     """
 
@@ -52,7 +51,7 @@ class Table:
         ]
 
     def _split_tree_lines(self) -> list[list[tuple[str, str]]]:
-        """Split each heading and cell into tree lines (`├ `) and text."""
+        """Split each heading and cell into its leading characters such as `├ ` and the following text."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(TREE_LINES),)]
             for row in (self.heads, *self.cells())

@@ -1,7 +1,7 @@
 """Escape names from files, with one function for each output format.
 
-A name in a URDF may contain line ends or terminal escape sequences. A name may also contain bidirectional
-control characters, HTML or spreadsheet formulas. Each function escapes these parts of a name for one format.
+A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
+spreadsheet formulas. Each function escapes these parts of a name for one format.
 """
 
 from __future__ import annotations
@@ -15,27 +15,25 @@ from typing import Any
 
 #: First characters that make a spreadsheet cell a formula.
 FORMULA_STARTS = ("=", "+", "-", "@")
-#: Matches an Azure or TeamCity command anywhere in a line.
-#: Group 1 is the character to escape.
+#: Pattern of a command of Azure or TeamCity, anywhere in a line. Group 1 is the character to escape.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: Commands of GitHub (`::error::`), Azure and TeamCity in logs.
-#: GitHub executes a command only at a line's beginning.
+#: Patterns of commands of GitHub (for example `::error::`), Azure and TeamCity in logs. GitHub executes a
+#: command only at the beginning of a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: Invisible character (word joiner).
-#: The character prevents Markdown links, mentions and issue numbers.
+#: Invisible character (word joiner) that prevents Markdown links, mentions and issue numbers.
 _WORD_JOINER = "&#8288;"
 
 
 def escape_unprintable(text: str) -> str:
-    """Escape unprintable characters and line ends, for safe output in a terminal."""
+    """Escape unprintable characters and line ends, so that the text is safe for a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def log_line(text: str) -> str:
-    r"""Return one line that is safe for terminals and CI logs.
+    r"""Return one line that is safe for a terminal and for the log of a CI service.
 
     >>> print(log_line("::error::a\n##vso[b]"))
     :\u003aerror::a\n##vso\u005bb]
@@ -65,7 +63,7 @@ def markdown_cell(words: str) -> str:
 def markdown_code(name: str) -> str:
     """Return a name as Markdown code.
 
-    Backticks and bars are escaped. A bar would end a table cell.
+    Backticks and bars are escaped, because a backtick ends the code, and a bar ends a table cell.
     """
     return "`" + (escape_unprintable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
@@ -95,7 +93,7 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def json_text(data: Any) -> str:
     r"""Return data as JSON text in ASCII.
 
-    A CI service can interpret text such as `##[error]` as a command. Therefore, the function escapes
+    A CI service can interpret text such as `##[error]` as a command. To prevent this, the function escapes
     the second `#` of each `##`. A JSON parser restores the original text.
 
     >>> print(json_text(["\u202e ##[error]"]))
@@ -116,8 +114,8 @@ def escape_sequence(c: str) -> str:
 def csv_cell(name: str) -> str:
     r"""Escape a name for a CSV cell.
 
-    The result is one line. No spreadsheet interprets the line as a formula. An apostrophe before `=`, `+`,
-    `-` or `@` marks the cell as text. `from_csv_cell` removes the apostrophe.
+    The result is one line that no spreadsheet interprets as a formula. An apostrophe before `=`, `+`, `-` or
+    `@` marks the cell as text. `from_csv_cell` removes the apostrophe.
 
     >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
     ("'=cmd|'/C calc'!A0", 'joint1')

@@ -11,15 +11,15 @@ import math
 import re
 from typing import NamedTuple
 
-#: The matching time is linear in the text's length.
+#: The matching time is linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-#: `parse_float` and `parse_int` reject texts with more characters.
-#: Python converts long integers in quadratic time.
+#: `parse_float` and `parse_int` reject texts with more characters than this number. Python converts long
+#: integers in quadratic time.
 _MAX_LENGTH = 2000
 
-#: Patterns of invalid numbers, with remedies.
-#: The first matching pattern determines the remedy.
+#: Patterns of invalid numbers, each with the remedy for the message. If several patterns match, the first
+#: pattern determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -75,7 +75,7 @@ _MAX_QUANTITY_LENGTH = 200
 
 
 class ParsedNumber(NamedTuple):
-    """A parsed number. A number with a unit is converted to radians or metres.
+    """A parsed number, converted to radians or metres if the text has a unit.
 
     Attributes:
         unit: "rad", "m", or None for a number without a unit. A multiple of pi without a unit is in radians.
@@ -88,9 +88,7 @@ class ParsedNumber(NamedTuple):
 
 
 def parse_quantity(text: str) -> ParsedNumber | None:
-    """Parse a finite number with an optional unit.
-
-    Return None for other text, such as a sum.
+    """Parse a finite number with an optional unit, or return None for other text, such as a sum.
 
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)

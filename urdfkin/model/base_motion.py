@@ -1,4 +1,4 @@
-"""The motion of the base, the initial condition of the forward recursion (section 7.7)."""
+"""The motion of the base, which is the initial condition of the forward recursion (end of section 7.7)."""
 
 from __future__ import annotations
 

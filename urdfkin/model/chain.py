@@ -2,10 +2,10 @@
 
 The symbols are from section 7.5 of the textbook. The axis of joint i is z_{i-1} at O_{i-1}. A revolute joint
 rotates about z_{i-1}, and a prismatic joint translates along z_{i-1}. The vector d_{i-1,i} leads from O_{i-1}
-to O_i. The path may lead upwards, downwards, or through a common ancestor. An example is the path from the
-left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes a joint from
-child to parent, the joint's axis is reversed. The coordinate q then keeps the sign of the URDF. The reason is
-that the inverse of Rz(q) rotates by q about -z.
+to O_i. The path may lead from parent to child, from child to parent, or through a common ancestor. An example
+is the path from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path
+passes a joint from child to parent, the joint's axis is reversed. The coordinate q then keeps the sign of the
+URDF, because the inverse of a rotation by q about z rotates by q about -z.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Minimum robot size (m) in a comparison of mechanisms.
-#: The size is 0 if all frames share an origin.
+#: Minimum size (m) of a robot in a comparison of mechanisms. The computed size is 0 if all frames have the
+#: same origin.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -45,8 +45,8 @@ class ChainJoint:
 
     Attributes:
         backwards: True if the path leads from child to parent.
-        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. The z axis of the pose is the joint's axis.
-            If `backwards` is true, z is the reversed axis.
+        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. The z axis of the pose is the joint's axis,
+            or the reversed axis if `backwards` is true.
         mimic: The mimic rule, or None for an independent joint.
     """
 
@@ -72,8 +72,8 @@ class FrameChain(Displayable):
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the frame after the last motion M_n. Without joints, the pose is
-            relative to the base frame.
+        T_last_tip: (4, 4) pose of the tip in the frame after the last motion M_n. If the path has no joints,
+            the pose of the tip in the base frame.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
             upper bound on the translation in A_k. The bound does not depend on the fixed joints' rotations.
         pose_counts: (n + 1,) upper bound on the number of URDF joint poses in the product A_k.
@@ -270,8 +270,8 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # Backwards, a rotation to the axis precedes the joint's motion.
-            # The constant pose follows the motion as one more pose.
+            # On a path from child to parent, a rotation to the joint's axis comes before the joint's motion.
+            # The joint's constant pose comes after the motion, and counts as one more pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

@@ -46,10 +46,9 @@ from urdfkin.model.tree import (
     limits_with_margin,
 )
 
-#: Largest |value| (rad or m) in `sample` of one-coordinate joints.
-#: If limits exclude all these values, `sample` draws larger values.
-#: Without limits, some bounds assume |q| <= `ASSUMED_LIMIT` (m).
-#: Few linear axes of robots are longer than 10 m.
+#: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate. If the limits of a
+#: joint exclude all of these values, `sample` draws larger values. Some upper bounds assume that joints
+#: without limits travel at most this distance (m) from zero. Few linear axes of robots are longer than 10 m.
 ASSUMED_LIMIT = 10.0
 #: Text of the condition under which an upper bound holds.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
@@ -100,10 +99,10 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with one coordinate, without mimic joints.
+    """Return the range of each joint that has one coordinate, without regard to mimic joints.
 
-    A range is cut to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. An outside range keeps only its
-    part nearest to 0, of length `ASSUMED_LIMIT`.
+    A range is cut to the interval from -`ASSUMED_LIMIT` to `ASSUMED_LIMIT`. If a range is outside this
+    interval, only its part of length `ASSUMED_LIMIT` nearest to 0 remains.
     """
 
     def own_range(joint: Joint) -> tuple[float, float]:
@@ -120,9 +119,9 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return each joint's range, reduced by the limits of its mimic joints.
+    """Return the range of each joint, reduced by the limits of its mimic joints.
 
-    If mimic joints allow at most one value, the range is not reduced.
+    If the mimic joints allow at most one value, the range is not reduced.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -167,11 +166,10 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # Each end moves inwards by the rounding error.
-    # The mimic joint is then within its limits.
+    # Move each end inwards by the rounding error, so that the mimic joint is within its limits.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # A mimic joint with one limit has infinite `size`.
+    if not math.isfinite(error):  # A mimic joint with only one limit has an infinite `size`.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -182,12 +180,11 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
 
 
 def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
-    """Widen limits by one unit in the last place. Parsing rounds decimal limits."""
+    """Widen limits by one unit in the last place, because parsing rounds decimal limits."""
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: Allowed deviation from a mimic rule in `from_pinocchio`.
-#: The unit is max(1, largest absolute value).
+#: Allowed deviation from a mimic rule in `from_pinocchio`, relative to max(1, largest absolute value).
 _MIMIC_TOLERANCE = 1e-9
 
 
@@ -196,8 +193,7 @@ _Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
-#: Suffix and unit of a free joint's velocities.
-#: The unit lacks "/s" for v and "/s^2" for a.
+#: Suffix and unit of each velocity of a planar or floating joint. The unit lacks "/s" for v and "/s^2" for a.
 _VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
     JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
@@ -231,10 +227,7 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
-    """Return "rad", "m" or "" for each number of q, v or a.
-
-    The result does not contain the time unit.
-    """
+    """Return "rad", "m" or "" for each number of q, v or a, without the time unit."""
     return tuple(
         unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if symbol == "q" else _VELOCITY_SUFFIXES)
     )
@@ -333,8 +326,8 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value of each locked joint, rad or m.
 
-    If `joints` is given, all other joints are locked. A locked joint without a value in `lock` is at 0. If
-    `lock` names a pose, the pose gives the value.
+    If `joints` is given, all other joints are locked. A locked joint without a value in `lock` has the value
+    of the pose that `lock` names, or 0.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
@@ -486,9 +479,8 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Maximum number of configurations that are searched for degrees.
-#: A batch normally has one unit.
-#: Therefore, a few configurations are enough.
+#: Maximum number of configurations in which urdfkin looks for angles in degrees. A batch normally has one
+#: unit, so a few configurations are enough.
 _MAX_CHECKED = 16
 
 
@@ -695,7 +687,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Positions of free joints in `sample`: [-2, 2] m.
+#: `sample` draws the positions of planar and floating joints from -2 to 2 m.
 _MAX_SAMPLED_POSITION = 2.0
 
 
@@ -766,8 +758,8 @@ def draw_samples(
 ) -> Samples:
     """Draw random samples for a validation.
 
-    A mimic joint may exceed its limits. The equations are also valid there. Every eighth sample has large
-    velocities. The quadratic terms of the acceleration are then dominant (7.129, 7.130).
+    A mimic joint may exceed its limits, because the equations are also valid there. In every eighth sample,
+    large velocities make the quadratic terms of the acceleration dominant (7.129, 7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_zero_and_limits:

@@ -1,10 +1,10 @@
-"""Integrate joint velocities, and compute velocities between two configurations.
+"""Integrate joint velocities, and compute the velocities that lead from one configuration to another.
 
-For orientations, q + v is meaningless. Use `integrate` and `difference` instead of + and -. The two functions
-agree with Pinocchio's functions of the same names. For a joint with one coordinate, `integrate` adds and
-`difference` subtracts. For a continuous joint, `difference` also removes full turns. If a full turn moves a
-mimic joint, `difference` keeps full turns. For a planar or floating joint, the velocity (w, s) is constant in
-the moving frame. The joint makes a screw motion from the pose (R_0, p_0):
+For a configuration q with orientations, q + v is meaningless. Use `integrate` and `difference` instead of +
+and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
+`integrate` adds and `difference` subtracts. For a continuous joint, `difference` also removes full turns,
+unless a full turn moves a mimic joint. The joint velocity (w, s) of a planar or floating joint is constant in
+the moving frame. Therefore, the joint makes a screw motion from the pose (R_0, p_0):
 
     R = R_0 exp(w)
     p = p_0 + R_0 V(w) s
@@ -58,8 +58,8 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the velocities that lead to `end` in one second.
 
-    Continuous, planar and floating joints rotate by at most half a turn. A full turn of a continuous joint
-    can move a mimic joint. The continuous joint then makes the full rotation.
+    Continuous, planar and floating joints rotate by at most half a turn. A continuous joint makes the full
+    rotation if a full turn of this joint moves a mimic joint to another pose.
     """
     shape = common_batch_shape((start.shape[:-1], end.shape[:-1]))
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -89,7 +89,7 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
 
 
 def _full_turn_keeps_pose(tree: KinematicTree, joint: Joint) -> bool:
-    """Return whether mimic joints keep their poses after a joint's full turn."""
+    """Return whether the joint's mimic joints have the same pose after a full turn of the joint."""
     rules = [(other.kind, other.mimic) for other in tree.joints if other.mimic]
     return all(
         rule.multiplier.is_integer() if kind.turns else rule.multiplier == 0.0
@@ -105,7 +105,7 @@ def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _split_block(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Split the joint's part of q or v into (linear, angular)."""
+    """Split the joint's numbers of q or v into a linear and an angular part."""
     if joint.kind is JointKind.FLOATING:
         return block[..., :3], block[..., 3:]
     if joint.kind is not JointKind.PLANAR:

@@ -1,8 +1,8 @@
-"""Map a path's coordinates q to the joint values G q + g.
+"""Map a path's coordinates q to the joint values G q + g, including the values of mimic joints.
 
-The coordinates are the independent joints that determine the joint values. The coordinates have the order of
-their first use on the path. A mimic joint has no coordinate. The value of a mimic joint is `multiplier *
-q_mimicked + offset`. A mimicked joint outside the path is also a coordinate.
+The coordinates of a path are the independent joints that determine its joint values, in the order of their
+first use on the path. A mimic joint has no coordinate; its value is `multiplier * q_mimicked + offset`. The
+mimicked joint is a coordinate of the path even if the path does not contain the mimicked joint.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Coupling:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the path's coordinates, in the order of first use."""
+        """Names of the path's coordinates, in the order of their first use on the path."""
         return tuple(dict.fromkeys(self._coordinate_by_joint))
 
     @cached_property
@@ -59,7 +59,7 @@ class Coupling:
     def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # A mimicked joint outside the path has no known unit.
+        # The unit of a mimicked joint outside the path is unknown.
         own = tuple(map(units.get, self.names))
         hints = {
             joint: Hint(
@@ -76,7 +76,7 @@ class Coupling:
         """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
         with np.errstate(over="ignore"):  # RangeError replaces this warning.
-            # Each row of G has at most one nonzero number.
+            # Each row of G has at most one nonzero number, so no matrix product is needed.
             return check_range(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:

@@ -1,12 +1,12 @@
-"""Poses and Jacobian of a path of constant poses and elementary motions.
+"""Poses and Jacobian of a path that consists of constant poses and elementary motions.
 
 `T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...`
 
-Each C_k is a constant pose. Each E_k is Rx, Ry, Rz, Tx, Ty or Tz by the amount x_k. Chains,
-Denavit-Hartenberg tables and screws have this form. The commands `dh --compare` and `calibrate` also use this
-form. The amounts x_k (rad or m) are joint values, table cells, or parameters. Let p be the position of the
-path's end. The end's derivative with respect to x_k is a twist (dp/dx_k, w). The axis of E_k has the
-direction e and contains the point O. The path's first frame expresses e and O. The twist is:
+Each C_k is a constant pose. Each E_k is one of the motions Rx, Ry, Rz, Tx, Ty and Tz by the amount x_k.
+Chains, Denavit-Hartenberg tables, screws, and the models of `dh --compare` and `calibrate` have this form.
+The amounts x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of the
+path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
+direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is:
 
 | motion | dp/dx_k | w |
 |---|---|---|
@@ -98,7 +98,7 @@ class Path:
     def pose_and_jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
-        # A motion does not change the components of its axis.
+        # The axis of a motion has the same components in the frames before and after the motion.
         at = [i for i, _ in motions]
         axes = frames[..., at, :3, [step.axis for _, step in motions]]
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))

@@ -1,4 +1,4 @@
-"""The forward recursion (section 7.7) and a frame's quantities, for any kind of number.
+"""The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
 `urdfkin.kinematics.arithmetic.bind_equations` makes the textbook's equations for one kind of number.
 """
@@ -15,7 +15,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 SixVector = tuple[Number, ...]
-#: Part of q, v or a, from the joint's first number.
+#: The part of q, v or a that begins at the joint's first number.
 JointSlice = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -24,7 +24,7 @@ IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 @dataclass(frozen=True, slots=True)
 class LinkState:
-    """R and p are in world axes. `Recursion.own_axes` determines the other axes."""
+    """R and p are in world axes; `Recursion.own_axes` determines the axes of the other vectors."""
 
     R: Matrix = IDENTITY
     p: Vector = ZERO
@@ -51,7 +51,8 @@ class Recursion:
     """The steps of the forward recursion."""
 
     eq: Any  #: The textbook's equations for one kind of number.
-    own_axes: bool = False  #: True: velocities and accelerations in link axes; False: world axes.
+    #: Whether velocities and accelerations are in link axes instead of world axes.
+    own_axes: bool = False
 
     def express(self, s: LinkState, x: Vector) -> Vector:
         return x if self.own_axes else self.eq.rotate(s.R, x)
@@ -95,8 +96,8 @@ class Recursion:
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
         """Return the state after a planar or floating joint.
 
-        `rates` contains the velocity and acceleration, in the child's axes. The order is linear velocity,
-        angular velocity, linear acceleration, angular acceleration.
+        `rates` are the joint's linear velocity, angular velocity, linear acceleration and angular
+        acceleration, in this order and in the child's axes.
         """
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
@@ -110,7 +111,7 @@ class Recursion:
 
     # -- quantities of a frame -----------------------------------------------------------------------
     # `velocity` and `acceleration` return vectors in the axes of `own_axes`.
-    # `Reference.WORLD`, `in_reference` and columns need `own_axes` = False.
+    # `Reference.WORLD`, `in_reference` and all methods with columns need `own_axes` = False.
 
     def velocity(self, s: LinkState, reference: Reference) -> tuple[Vector, Vector]:
         """Return the linear and angular velocity (7.127, 7.128)."""
@@ -181,10 +182,9 @@ class Recursion:
     def hessian(
         self, s: LinkState, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
-        """Yield tuples (i, j, factor, x).
+        """Yield tuples (i, j, factor, x), where i and j are indices of v.
 
-        The indices i and j are indices of v. For all tuples (i, j, ...), the sum of `factor * x` is d(column
-        i)/dq_j.
+        The derivative of column i with respect to q_j is the sum of factor * x over all tuples (i, j, ...).
         """
         point = ZERO if reference.at_world else s.p
         computed = [(one, self._column(one, point)) for one in columns]
@@ -203,7 +203,7 @@ class Recursion:
     def _column_derivative(
         self, column_i: Any, column_j: Any, reference: Reference, *, is_before: bool
     ) -> tuple[Vector, Vector]:
-        """Return d(column i)/dq_j; `is_before` means that j is not after i."""
+        """Return d(column i)/dq_j; `is_before` means that joint j precedes joint i, or is joint i."""
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO
         match reference:

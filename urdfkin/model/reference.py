@@ -23,8 +23,10 @@ class Reference(IntEnum):
     True
     """
 
-    own_axes: bool  #: True: results in the frame's axes; False: world axes.
-    at_world: bool  #: True: motion of the body point at the world's origin.
+    #: Whether the results are in the frame's axes instead of the world's axes.
+    own_axes: bool
+    #: Whether the linear part is the motion of the body point at the world's origin.
+    at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
         member = int.__new__(cls, number)

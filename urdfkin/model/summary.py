@@ -1,4 +1,4 @@
-"""The summary of a robot: a tree of links and joints with table columns."""
+"""The summary of a robot: the tree of its links and joints, with columns for axes, indices and limits."""
 
 from __future__ import annotations
 

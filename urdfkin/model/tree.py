@@ -1,7 +1,7 @@
 """The robot model: a tree of links and joints, with limits and mimic rules.
 
-`KinematicTree` depends neither on XML nor on Pinocchio. The links and joints are in Pinocchio's order. The
-order is depth first, with sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and
+`KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order, which
+is depth first, with sibling joints sorted by name. Therefore, `q` and `v` have the same order in urdfkin and
 in Pinocchio. A frame has the name of its link or joint. A link and a joint can have the same name.
 """
 
@@ -71,7 +71,7 @@ class JointKind(Enum):
 
     nq: int
     nv: int
-    nq_pinocchio: int  #: Number of coordinates in Pinocchio. Example: 2 for (cos, sin).
+    nq_pinocchio: int  #: Number of coordinates in Pinocchio, for example 2 for (cos, sin).
     has_axis: bool  #: Whether the joint rotates about, or translates along, one axis.
     turns: bool
     has_limits: bool  #: Whether joints of this kind have position limits.
@@ -110,9 +110,9 @@ class Limit:
 #: Largest plausible |joint angle| (rad).
 #: Some industrial wrists turn 400 degrees in each direction.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: Joint values beyond these margins are far outside the limits.
-#: margin = max(`_MARGIN` (rad or m), `_MARGIN_FRACTION` * range).
-#: With only one limit, the margin is 0.
+#: A joint value is far outside the limits if it exceeds a limit by more than the larger of two margins. The
+#: margins are `_MARGIN` (rad or m) and `_MARGIN_FRACTION` times the joint's range. For a joint with only one
+#: limit, the margin is 0.
 _MARGIN, _MARGIN_FRACTION = 0.5, 0.25
 
 
@@ -132,7 +132,7 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule `multiplier * q_mimicked + offset`. The mimicked joint is independent."""
+    """The rule `multiplier * q_mimicked + offset`; the mimicked joint is not a mimic joint."""
 
     mimicked_joint: str
     multiplier: float
@@ -200,7 +200,7 @@ class Joint:
 
         For a locked prismatic joint, |displacement| is added.
         """
-        # hypot has no squares, which overflow for 1e200.
+        # hypot avoids squares, which overflow for 1e200 and underflow for 1e-200.
         length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
             length += abs(self.lock.value)
@@ -468,7 +468,7 @@ def with_pinocchio_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> Kin
 
 
 def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Replace the named poses. Drop values of mimic joints and joints with several coordinates."""
+    """Replace the named poses, and drop values of mimic joints and of joints with several coordinates."""
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()
@@ -477,7 +477,7 @@ def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Lock joints and their mimic joints at values in rad or m."""
+    """Lock joints, and the joints that mimic them, at values in rad or m."""
     independent_joints = [joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in tree.joints]
     joints = [
         Lock(joint, values[mimicked_joint]).make_fixed_joint() if mimicked_joint in values else joint

@@ -84,12 +84,11 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Pinocchio and MuJoCo have the same default value.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations in a rank computation.
+#: Number of random configurations that determine the generic rank of a Jacobian.
 _RANK_SAMPLES = 3
 #: `dir(robot)` omits these internal members.
 _INTERNAL_NAMES = {"plan", "single", "single_terms", "verifier"}
-#: Maximum number of float64 values in an array.
-#: The number of bytes must fit in 63 bits.
+#: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
 _MAX_NUMBERS = (2**63 - 1) // 8
 
 
@@ -172,11 +171,9 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Maps a joint to its terms of `single`.
-        #: None: the source is not a USD stage in single precision.
+        #: Terms of `single` for each joint. None if the source is not a USD stage in single precision.
         self.single_terms: SingleRoundingTerms | None = None
-        #: Maps a link to the USD path of its prim.
-        #: Without a USD stage, the mapping is empty.
+        #: USD path of each link's prim (USD object). The mapping is empty if the source is not a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -519,9 +516,8 @@ class Robot(Displayable):
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
         The same seed gives the same configurations. In some robots, the limits of a mimic joint allow at most
-        one value of the mimicked joint. The configurations of such a robot respect the mimicked joint's
-        limits. The configurations may exceed the mimic joint's limits. `limit_violations` then reports the
-        mimic joint.
+        one value of the mimicked joint. The configurations of such a robot respect the limits of the mimicked
+        joint, but may exceed the limits of the mimic joint. `limit_violations` then reports the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -556,7 +552,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # The returned lines already mention values that look like degrees.
+        # The returned lines mention values that are probably in degrees, so a warning is not needed.
         q = configuration.parse_finite(self.tree, q, "q", warn=False)
         return configuration.limit_violations(self.tree, q)
 
@@ -593,8 +589,8 @@ class Robot(Displayable):
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
         The result is the shortest motion, as in Pinocchio's `difference`. `integrate(start, difference(start,
-        end))` gives the same pose of the robot as `end`. A full turn of a continuous joint may move a mimic
-        joint to another pose. Such a continuous joint makes the full rotation.
+        end))` gives the same pose of the robot as `end`. Therefore, a continuous joint makes the full
+        rotation if a full turn of this joint moves a mimic joint to another pose.
 
         Args:
             start: (..., nq) rad, m.
@@ -629,8 +625,8 @@ class Robot(Displayable):
             (..., model.nq).
 
         Raises:
-            InputError: a wrong length, or a number that is not finite. With `mimic=True`, a continuous joint
-                beyond pi, if its turns move a mimic joint to another pose.
+            InputError: a wrong length, or a number that is not finite. With `mimic=True`, also if a
+                continuous joint is beyond pi, and its full turns move a mimic joint to another pose.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").to_pinocchio("joint_1=0.5, joint_2=-1").tolist()
@@ -716,8 +712,7 @@ class Robot(Displayable):
         if joints is not None:
             reject_set(joints, "joints")
             joints = [as_str(joint, "each of joints") for joint in as_names(joints, "joints")]
-        # Only MJCF and USD files have a digest.
-        # urdfkin writes no masses into the URDF of these sources.
+        # Only MJCF and USD files have a digest, and urdfkin writes no masses into the URDF of these files.
         has_masses = not self.origin.sha256 and self.source not in ("<pinocchio.Model>", "<yourdfpy>")
         return Conversion(self.tree, self.urdf, find_convention(name), joints, has_masses=has_masses)
 
@@ -867,7 +862,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
-        # A subclass of str can print itself differently in messages.
+        # A subclass of str can print itself differently in messages, so the name becomes a plain str.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(
             self.tree, self.plan, frame, _ALIGNED, None, (q,), additional_frames=(name,), relative_to=name
@@ -1102,8 +1097,8 @@ class Robot(Displayable):
             rows: Rows of J: "all", "linear" or "angular".
 
         Raises:
-            InputError: a wrong length, a number that is not finite, or batch shapes that do not broadcast; or
-                an invalid `rows`.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or an
+                invalid value of `rows`.
             VerificationError: Pinocchio's Jacobian differs by more than the bound.
 
         >>> import urdfkin
@@ -1164,9 +1159,9 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a configuration is nearer to the singularity than `nearest`. In a
-                checked call, the smallest accepted distance is at least the rotation's rounding error (about
-                1e-13 rad). A quaternion has no singularity.
+            RepresentationSingularityError: a configuration is nearer to the singularity than `nearest`. If
+                Pinocchio checks the call, the smallest accepted distance is at least the rounding error of
+                the rotation (about 1e-13 rad). A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1303,8 +1298,8 @@ class Robot(Displayable):
                 pair of joints.
 
         Raises:
-            InputError: an argument is a batch, has a wrong length or is not finite; `digits` is not in 15 to
-                10,000.
+            InputError: an argument is a batch, has a wrong length or is not finite, or `digits` is not in 15
+                to 10,000.
             UnknownNameError: the frame or reference does not exist.
 
         >>> import urdfkin
@@ -1543,7 +1538,7 @@ class Robot(Displayable):
                 rows have only the four parameters.
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the last row ends at the tip if its four parameters suffice. "flange": the last row
-                ends on the last joint axis. The tool transform leads from this axis to the tip.
+                ends on the last joint axis, and the tool transform leads from this axis to the tip.
             parallel_offset: Row for the sum of the offsets d along consecutive parallel axes. "last": the row
                 of the last axis. "first": the row of the first axis. "each": no sum, each row contains the
                 offset of its own link.
@@ -1556,14 +1551,14 @@ class Robot(Displayable):
                 axis of the last row.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
                 joint's origin in the URDF. `make_dh_table` lists exceptions, such as the first joint.
-                "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint. The
-                length a between these two axes is then 0. The previous joint is used only if the next joint
-                is not revolute.
-            like: A published table. From this table, the result copies positive joint directions, directions
-                of x axes, and offsets d along parallel axes. The result also copies theta of the first and
-                last row. From a standard table, the result also copies a and alpha of the last row. All other
-                numbers come from the URDF. If `like` is used, the arguments `flip`, `first`, `last`, `sign`
-                and `parallel_offset` must have their default values.
+                "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint, so
+                the length a between these two axes is 0. The previous joint is used only if the next joint is
+                not revolute.
+            like: A published table. The result copies the positive joint directions, the directions of the x
+                axes, and the offsets d along parallel axes from this table. The result also copies theta of
+                the first and last row. From a standard table, the result also copies a and alpha of the last
+                row. All other numbers come from the URDF. If `like` is used, the arguments `flip`, `first`,
+                `last`, `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1571,7 +1566,7 @@ class Robot(Displayable):
             InputError: an option has an invalid value; `like` excludes an option; `like` describes a
                 different robot; the path contains a planar or floating joint.
             RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
-                Or the bound on the table's errors leaves the range of double precision.
+                Also if the bound on the table's errors leaves the range of double precision.
             TableError: Pinocchio's placements differ by more than the bound.
 
         Example:
@@ -1736,10 +1731,9 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # The hash of a `Reference` is slow.
-        # With the default reference, a plain str is the key.
-        # All other keys are tuples, and contain the class of `frame`.
-        # `LinkFrame("link:a") == "link:a"`, but their frames can differ.
+        # The hash of a `Reference` is slow. Therefore, a plain str with the default reference is its own key.
+        # All other keys are tuples that contain the class of `frame`, because `LinkFrame("link:a") ==
+        # "link:a"`, but their frames can differ.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 class ConventionRobot:
     """A robot in the convention of a target program, from `robot.with_convention("mujoco")`.
 
-    Each method has the name and the arguments of a method of `Robot`. The target program's order applies to
-    q, v, a, the columns of Jacobians and the rows of six-vectors. The target program's units apply to q, v
-    and a, and to the columns of Jacobians: J v is in m/s and rad/s. Pinocchio checks each result before
-    urdfkin converts the result. An array `out` receives the unconverted result.
+    Each method has the name and the arguments of a method of `Robot`. The target program's order applies
+    to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's units
+    apply to q, v and a, and to the columns of Jacobians: J v is in m/s and rad/s. Pinocchio checks each
+    result before urdfkin converts the result. An array `out` receives the unconverted result.
 
     Attributes:
         robot: The robot.

@@ -168,8 +168,8 @@ def frame_motion(
 
     Args:
         robot: The robot.
-        motion: A trajectory, for example from `urdfkin.read_trajectory`. Or q (n, nq), v (n, nv) and a (n,
-            nv) in rad, m and s.
+        motion: A trajectory, for example from `urdfkin.read_trajectory`, or the arrays q (n, nq), v (n, nv)
+            and a (n, nv) in rad, m and s.
         frame: Name of a link or joint.
         reference: Reference frame of velocity, acceleration and Jacobian.
 

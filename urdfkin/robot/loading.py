@@ -299,7 +299,7 @@ def _load_usd(
 
 
 def _load_without_options(robot: Robot, text: UrdfText, **options: Any) -> Robot:
-    """Load a robot from a text: fixed root, no locked joints, all mimic rules."""
+    """Load a text as a robot with a fixed root, without locked joints and with all mimic rules."""
     origin = robot.origin
     plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
     return robot if plain else make_robot(text, **options)

@@ -8,8 +8,8 @@ The motion starts and ends at rest, and the acceleration is continuous.
 
 *Differences.* Joint velocities that a file lacks are central differences of the configurations. Their error
 is proportional to the square of the time step. Joint accelerations from configurations have a larger error at
-the first and last sample. This error is proportional to the time step. For an estimate of all errors, urdfkin
-also computes the differences from every second sample.
+the first and last sample, proportional to the time step. To estimate all errors, the differences are also
+computed from every second sample.
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
 At the end of this range, a wrapped angle jumps by one turn. The quaternion of a floating joint may change its
@@ -57,12 +57,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of one sample for each array: `{"q": (nq,)}`.
+#: Shape of one sample in each array, for example `(nq,)` for q.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
-    """Read arrays (n, ...) of finite numbers from an .npz file, with one n.
+    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
 
     Pickled objects are rejected, because unpickling can execute code from the file.
     """
@@ -120,11 +120,11 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: Minimum number of samples. A second difference needs three samples.
+#: Minimum number of samples; a second difference needs three.
 _MIN_SAMPLES = 3
-#: More samples do not fit in memory.
+#: Maximum number of samples. More samples do not fit in memory.
 _MAX_SAMPLES = 10**9
-#: Names of .npz arrays that describe the root link's motion.
+#: Names of the .npz arrays with the root link's pose, velocity and acceleration.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 #: Maximum rounding error of times, divided by the smallest step.
 #: Above this limit, the trajectory has a note.
@@ -215,7 +215,7 @@ def make_line_trajectory(
 
     Raises:
         InputError: the duration is not above 0 s; `samples` is below 3; a configuration has a wrong length or
-            is a batch; a number is not finite.
+            is a batch; or a number is not finite.
         RangeError: the duration is so short that an acceleration is not a finite double.
     """
     _check_robot(robot)
@@ -241,9 +241,8 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # v = s_1 * step and a = s_2 * step for each joint.
-    # For planar and floating joints, `step` is a twist.
-    # This twist is constant in the moving frame's axes.
+    # For planar and floating joints, `step` is a twist that is constant in the moving frame's axes.
+    # Therefore, v = s_1 * step and a = s_2 * step for all joints.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -275,7 +274,8 @@ def read_trajectory(
     Raises:
         SourceError: the file cannot be read.
         InputError: the header is missing, or a column or an array is unknown, missing or duplicate. Other
-            reasons: a cell is no number, a unit is wrong, time does not increase, or samples are too few.
+            reasons: a cell is not a number, a unit is wrong, time does not increase, or there are too few
+            samples.
         UnknownNameError: the convention does not exist.
 
     >>> import urdfkin
@@ -334,7 +334,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
         coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # The error of a is proportional to (time step)^order.
+        # The error of the acceleration is proportional to h^order, where h is the time step.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -399,7 +399,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Map the names of q, v or a to units, such as "m/s"; "" for quaternions."""
+    """Map the name of each number in q, v or a to its unit, such as "m/s", or to "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -421,7 +421,7 @@ def _read_npz(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 def _central_velocities(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
     """Return joint velocities (n, nv).
 
-    For planar and floating joints, the moving frame's axes apply.
+    The velocities of planar and floating joints are in the axes of the moving frame.
     """
     slopes = _differentiate(q, t)
     v = np.empty((len(q), tree.nv))
@@ -465,10 +465,11 @@ def read_columns(
     requires_header: bool = False,
     units: Mapping[str, str] | None = None,
 ) -> Mapping[str, FloatArray]:
-    r"""Parse CSV text into columns (n,) of finite numbers in SI units; n >= 0.
+    r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
     Empty lines and lines that begin with # are skipped. The first other line may name the columns, in any
-    order. Otherwise, the columns are `required`. `units` maps the columns that may state a unit to SI units.
+    order. Otherwise, the columns are `required`. `units` contains the SI unit of each column that may have a
+    unit in its heading.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -505,12 +506,12 @@ def read_columns(
 
 
 _TIMES = ("t", "time", "timestamp")
-#: Maps a time unit's name to units per second.
+#: Number of time units in one second, by the name of the unit.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: Patterns such as `v:elbow_deg_s`, `a:elbow_rad_per_s2` or `elbow_deg`.
+#: Patterns of column names that end with a unit: `v:elbow_deg_s`, `a:elbow_rad_per_s2`, `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -518,7 +519,7 @@ _SUFFIXES = (
 
 
 def _parse_heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return a heading's column name and unit; "" for a missing or SI unit.
+    """Return the column name and the unit in a heading; the unit is "" if it is an SI unit or missing.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_parse_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -571,7 +572,7 @@ def _parse_unit(text: str, where: str, expected: str) -> str:
 
 def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
-        # Exactly: radians_from_degrees(15.0 * k) == k * math.pi / 12.
+        # For k * 15 degrees, `radians_from_degrees` returns the double k * math.pi / 12.
         return np.fromiter(map(radians_from_degrees, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
@@ -601,7 +602,7 @@ def parse_numbers(
 
 
 def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield each line's number and cells, except empty lines and # comments."""
+    """Yield the number and the cells of each line; skip empty lines and lines that begin with #."""
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         for row in reader:
@@ -646,17 +647,16 @@ def _check_columns(
         )
 
 
-#: Largest span (rad) of the samples that urdfkin unwraps.
-#: Angles in a file may be rounded to two decimals.
-#: The margin of 0.02 covers the rounding of two angles.
+#: If the samples of a joint span more than this angle (rad), urdfkin does not unwrap them. The margin of 0.02
+#: covers the rounding of two angles to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: Largest rotation (rad) between samples with a clear direction.
-#: Rotations by 120 and -240 degrees give the same pose.
-#: urdfkin assumes the rotation by 120 degrees, which is shorter.
+#: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain. For
+#: example, rotations by 130 and by -230 degrees lead to the same pose. At 120 degrees, the rotation in the
+#: other direction is twice as large.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
-#: Maximum rounding error (rad, m) of a mimic joint's value.
-#: A multiplier |m| > 1 multiplies this limit by |m|.
+#: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error. For a
+#: multiplier m with |m| > 1, the limit is |m| times this value.
 _MIMIC_ROUNDING = 1e-9
 
 
@@ -668,12 +668,10 @@ class UnwrappedSamples:
 
 
 def unwrap_angles(tree: KinematicTree, q: FloatArray) -> UnwrappedSamples:
-    """Unwrap angles in time-ordered samples (n, nq).
+    """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
-    Only continuous, planar and floating joints are unwrapped.
-
-    Between two samples, a joint is assumed to turn in the shorter direction. An angle with a span of more
-    than one turn stays unchanged.
+    Between two samples, a joint is assumed to turn in the shorter direction. If the samples of an angle span
+    more than one turn, the samples stay unchanged.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -689,7 +687,7 @@ def unwrap_angles(tree: KinematicTree, q: FloatArray) -> UnwrappedSamples:
 
 
 def _unwrap_joint_angle(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap the last coordinate of a continuous or planar joint, an angle."""
+    """Unwrap the angle of a continuous or planar joint; the angle is the joint's last coordinate."""
     angle, notes = own[:, -1], []
     new = own.copy()
     within_one_turn = bool(np.ptp(angle) <= _ONE_TURN)

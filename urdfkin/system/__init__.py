@@ -1,1 +1,1 @@
-"""Access to the operating system: files, cache, processes, locks, git, installed packages."""
+"""Access to the operating system: files, the cache on disk, processes, locks, git and installed packages."""

@@ -1,11 +1,12 @@
 """Store results in a cache on disk, with a checksum in each file.
 
-Cached files are executed or unpickled. A file of another user could run any code. Therefore, a folder to
-which other users can write is not used. The name of a folder contains a digest of the source files. Changed
-source files get a new folder. A folder without use for 30 days is deleted.
+urdfkin executes or unpickles cached files, so another user's file could run any code. A folder is therefore
+used only if no other user can write to it. The name of a folder contains a digest of the source files, so
+changed source files get a new folder. A folder that urdfkin has not used for 30 days is deleted.
 
-A damaged file could crash the process or cause a wrong result. Therefore, the file is reported and replaced.
-The checksum includes the names of file and folder. A renamed file could belong to another robot.
+A damaged file could crash the process or cause a wrong result, so the file is reported and replaced. The
+checksum includes the names of the file and of the folder, because a renamed file could belong to another
+robot.
 """
 
 from __future__ import annotations
@@ -41,17 +42,16 @@ _TRUSTED_OWNERS = (0, 65534)
 class CacheWarning(UserWarning):
     """The cache cannot be used, or a cached file is damaged.
 
-    The results are not affected.
+    The results of the computation are not affected.
     """
 
 
 def make_cache_folder(
     kind: str, sources: Iterable[Path], *versions: str, root: Path | None = None
 ) -> Path | None:
-    """Return a cache folder to which only this user can write.
+    """Return a cache folder to which only this user can write; warn and return None if this is impossible.
 
-    If there is no such folder, warn and return None. The folder's name is `kind` and a digest. The digest is
-    computed from the files `sources` and the strings `versions`.
+    The folder's name is `kind`, followed by a digest of the files `sources` and of the strings `versions`.
     """
     digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *versions]).encode())
     for source in sources:
@@ -86,10 +86,9 @@ _warned_messages: set[str] = set()
 
 
 def _unsafe_reason(folder: Path) -> str | None:
-    """Return the reason why another user could have written to a folder.
+    """Return the reason why another user could have written to a folder, or None for a safe folder.
 
-    Return None for a safe folder. A user who can write to a parent folder can replace `folder`. The sticky
-    bit of the parent folder prevents this replacement.
+    A user who can write to a parent folder can replace `folder`, unless the parent folder has the sticky bit.
     """
     me = os.geteuid()
     for path in (folder, *folder.parents):
@@ -105,10 +104,7 @@ def _unsafe_reason(folder: Path) -> str | None:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group is the private group of this user.
-
-    Many systems create a private group for each user.
-    """
+    """Return whether a group is the private group that many systems create for each user."""
     try:
         name, entry = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:
@@ -128,10 +124,7 @@ _DIGEST_SIZE = hashlib.sha256().digest_size
 
 
 def write_cached_file(path: Path, data: bytes) -> None:
-    """Write a file with a checksum, completely or not at all.
-
-    Report a failure as a `CacheWarning`.
-    """
+    """Write a file with a checksum, completely or not at all; report a failure as a `CacheWarning`."""
     name = ""
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
@@ -146,10 +139,7 @@ def write_cached_file(path: Path, data: bytes) -> None:
 
 
 def read_cached_file(path: Path) -> bytes | None:
-    """Return the content of a file that `write_cached_file` wrote.
-
-    Return None for a missing or damaged file.
-    """
+    """Return the content of a file that `write_cached_file` wrote, or None for a missing or damaged file."""
     try:
         content = read_if_exists(path, MAX_DATA_BYTES)
     except SourceError as error:

@@ -74,7 +74,7 @@ class DocumentKind(Generic[_T]):
     Attributes:
         verdicts: The possible verdicts; empty if the document has no header.
         command: Command that writes documents of this kind.
-        is_open: Whether a document may have unknown entries, for example of later versions.
+        is_open: Whether a document may have unknown entries, for example of a later version of urdfkin.
     """
 
     name: str
@@ -189,10 +189,9 @@ def read_json(path: Path) -> object:
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse JSON.
+    """Parse JSON; raise InputError for invalid JSON, NaN, infinity, and numbers such as 1e999.
 
-    Raise InputError for invalid JSON, NaN, infinity, and numbers such as 1e999. An integer may exceed the
-    range of doubles.
+    An integer may exceed the range of doubles.
     """
     try:
         return json.loads(content, parse_constant=_parse_finite, parse_float=_parse_finite)

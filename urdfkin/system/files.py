@@ -1,9 +1,9 @@
 """Read and write files safely, and replace parts of a text.
 
 By default, the functions read only regular files. An untrusted folder may contain a link to an endless
-device. The folder may also contain a named pipe without a writer. A path from the user may be a pipe. An
-example in bash is `<(xacro arm.xacro)`. The functions wait at most `PIPE_TIMEOUT` seconds for a writer of the
-pipe. Python's `open` would wait for ever.
+device, or a named pipe without a writer. A path from the user may be a pipe, such as `<(xacro arm.xacro)` in
+bash. The functions wait at most `PIPE_TIMEOUT` seconds for a writer of the pipe; Python's `open` would wait
+for ever.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: Maximum wait for a writer of a named pipe, s.
+#: Maximum time to wait for a process that opens the other end of a named pipe, s.
 PIPE_TIMEOUT = 10.0
-#: Maximum bytes of a robot, table, settings or cached file.
+#: Maximum size of a robot, table, settings or cached file, bytes.
 MAX_BYTES = 100_000_000
-#: Maximum bytes of data: trajectories, samples, reports.
+#: Maximum size of data (trajectories, samples, reports), bytes.
 MAX_DATA_BYTES = 2_000_000_000
 _CHUNK_BYTES = 2**20
 _FILE_TYPES = {
@@ -59,10 +59,9 @@ _FILE_TYPES = {
 
 
 def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -> bytes:
-    """Return the content of a file.
+    """Return the content of a file of at most `max_bytes` bytes, or raise SourceError.
 
-    Raise SourceError for an unreadable file, or more than `max_bytes` bytes. With `pipes`, the function also
-    reads pipes and devices. Use `pipes` only for paths that the user named.
+    With `pipes`, the function also reads pipes and devices. Use `pipes` only for paths that the user named.
     """
     data = read_start(path, max_bytes + 1, pipes=pipes)
     if len(data) > max_bytes:
@@ -71,12 +70,9 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -
 
 
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
-    """Return the first bytes of a file, at most `count` bytes.
-
-    `pipes` is as in `read_bytes`.
-    """
+    """Return the first bytes of a file, at most `count` bytes; `pipes` is as in `read_bytes`."""
     try:
-        # Without O_NONBLOCK, `os.open` would wait for a pipe's writer.
+        # Without O_NONBLOCK, opening a pipe blocks until a writer opens the pipe.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
         try:
             kind = os.fstat(descriptor).st_mode
@@ -100,10 +96,7 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
 
 
 def require_regular_file(path: Path) -> None:
-    """Raise SourceError for a pipe, a socket or a device.
-
-    A path that does not exist raises no error.
-    """
+    """Raise SourceError for a pipe, a socket or a device, but not for a path that does not exist."""
     try:
         kind = path.stat().st_mode
     except (OSError, ValueError):
@@ -158,10 +151,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def may_exist(path: Path) -> bool:
-    """Return whether a path exists.
-
-    Return True if the check fails, for example because the path is long.
-    """
+    """Return whether a path exists, or True if the check fails, for example for a path that is too long."""
     try:
         return path.exists()
     except OSError:
@@ -184,9 +174,7 @@ def expand_home(name: str | os.PathLike[str]) -> Path:
 
 
 def abbreviate_path(path: Path) -> str:
-    """Return a path for a message.
-
-    A path of more than 300 characters is abbreviated.
+    """Return a path for a message, abbreviated if it has more than 300 characters.
 
     >>> len(abbreviate_path(Path("x" * 5000))) < 200
     True
@@ -213,10 +201,7 @@ def _read_at_most(count: int, descriptor: int, first: bytes) -> bytes:
 
 
 def _read_first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """Return available bytes of a pipe.
-
-    Raise SourceError if no writer connects within `PIPE_TIMEOUT` s.
-    """
+    """Return available bytes of a pipe; raise SourceError if no writer connects within `PIPE_TIMEOUT` s."""
     events = select.poll()
     events.register(descriptor, select.POLLIN)
     end = time.monotonic() + PIPE_TIMEOUT
@@ -227,7 +212,7 @@ def _read_first_of_pipe(descriptor: int, path: Path) -> bytes:
         # A writer is connected, but has written nothing yet.
         except BlockingIOError:
             return b""
-        # POLLHUP: a writer has connected, and has closed the pipe.
+        # POLLHUP means that a writer has connected and then closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)

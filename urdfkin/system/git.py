@@ -1,7 +1,7 @@
 """Read files of an older version of a git repository.
 
-The module uses only git commands that read git objects. Commands that read the working tree can run external
-programs. Examples are `diff` and `status`. The settings of an untrusted repository could name any program.
+The module uses only git commands that read git objects. Commands that read the working tree, such as `diff`
+and `status`, can run external programs. The settings of an untrusted repository could name any program.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ class CommitFiles:
 
 
 def merge_base_files(reference: str, folder: Path) -> CommitFiles:
-    """Return the files of the merge base of HEAD and `reference`.
+    """Return the files of the merge base of HEAD and `reference`, which is a branch, tag or commit.
 
-    `reference` is a branch, tag or commit. Raise SourceError if git fails.
+    Raise SourceError if git fails.
     """
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     fetch = "in GitHub's actions/checkout set fetch-depth: 0"
@@ -98,7 +98,7 @@ def _text(*words: str, cwd: Path) -> str:
 
 
 def _git(*words: str, cwd: Path) -> bytes:
-    # These variables forbid fetches, prompts, pagers and translated messages.
+    # These variables prevent git from fetching, prompting, starting a pager or translating messages.
     environ = os.environ | {
         "GIT_NO_LAZY_FETCH": "1",
         "GIT_TERMINAL_PROMPT": "0",

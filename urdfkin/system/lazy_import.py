@@ -32,10 +32,7 @@ def lazy_import(target: str) -> Callable[..., Any]:
 
 
 def is_instance(x: object, target: str) -> bool:
-    """Return whether an object is an instance of the class `module:name`.
-
-    The module is not imported.
-    """
+    """Return whether an object is an instance of the class `module:name`, without importing the module."""
     module, _, name = target.partition(":")
     # A class of an unimported module has no instances.
     return isinstance(x, getattr(sys.modules.get(module), name, ()))
@@ -43,16 +40,16 @@ def is_instance(x: object, target: str) -> bool:
 
 @cache
 def installed_version(package: str) -> str | None:
-    # A search of the metadata folders is faster than `importlib.metadata`.
-    # The import of `importlib.metadata` takes 15 ms.
+    # A search of the metadata folders is faster than `importlib.metadata`, because the import of
+    # `importlib.metadata` takes 15 ms.
     start, end = f"{package.replace('-', '_')}-", ".dist-info"
     for entry in filter(os.path.isdir, sys.path):
         # `os.listdir` is faster than `Path.iterdir`.
         for name in os.listdir(entry):  # noqa: PTH208
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    # `metadata` is imported late, because `metadata` imports many modules.
-    # At the start, the current folder could contain such modules.
+    # `metadata` is imported late, because `metadata` imports many modules. At the start of urdfkin, files in
+    # the current folder could replace these modules.
     from importlib import metadata
 
     try:
@@ -74,10 +71,9 @@ EXTRA_REQUIREMENTS = {
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs the library of an extra.
+    """Return the command that installs the library of an extra, such as `pip install 'viser>=1'`.
 
-    An example is `pip install 'viser>=1'`. No package index contains urdfkin yet. Therefore, pip cannot
-    install an extra of urdfkin by name.
+    pip cannot install an extra of urdfkin by name, because no package index contains urdfkin yet.
     """
     return f"pip install '{EXTRA_REQUIREMENTS[extra]}'"
 

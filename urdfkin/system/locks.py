@@ -1,8 +1,8 @@
 """Locks that are unlocked in a child process after a fork.
 
-A fork copies all locks, but only the thread that calls `fork`. A lock of another thread would stay locked in
-the child for ever. `import urdfkin` imports this module first. Therefore, this module imports nothing that an
-untrusted current folder could replace.
+A fork copies all locks, but only one thread: the thread that calls `fork`. A lock that another thread holds
+would stay locked in the child for ever. `import urdfkin` imports this module first, so this module imports
+nothing that an untrusted current folder could replace.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def make_fork_safe_lock() -> threading.RLock:
     A thread that needs two locks must also acquire the newer lock first.
     The opposite order can cause a deadlock.
 
-    Use this function only for module variables. Each lock is stored until the process ends.
+    Use this function only for module variables, because this module stores each lock until the process ends.
     """
     import_lock.register_fork_handlers()
     lock = threading.RLock()
@@ -38,8 +38,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # Another thread can register `_before_fork` during this fork.
-    # `_acquired_locks` then lacks this thread.
+    # If another thread registers `_before_fork` during this fork, `_acquired_locks` lacks this thread.
     for lock in reversed(_acquired_locks.pop(threading.get_ident(), [])):
         lock.release()
 
@@ -50,10 +49,10 @@ class ImportLock:
     Without this lock, another thread could fork a child process during an import. The child process would
     then never finish this import. This lock is not Python's import lock.
 
-    A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. During an
-    import, a thread may also need the lock of `logging`. Therefore, a fork must acquire the import lock
-    first. The opposite order can cause a deadlock. Before a fork, Python calls the registered functions in
-    reverse order. Therefore, `register_fork_handlers` imports `logging` before registering `_before_fork`.
+    A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. A thread that
+    holds the import lock may need the lock of `logging` during the import. To avoid a deadlock, a fork must
+    acquire the import lock before the lock of `logging`. Before a fork, Python calls the registered functions
+    in reverse order. Therefore, `register_fork_handlers` imports `logging` before registering `_before_fork`.
     """
 
     def __init__(self) -> None:
@@ -61,13 +60,13 @@ class ImportLock:
         _locks.append(self._lock)
 
     def register_fork_handlers(self) -> None:
-        # Waiting here could cause a deadlock.
-        # The lock's owner may wait for the calling module's import.
+        # Waiting here could cause a deadlock. The thread that holds the lock may wait for the import of the
+        # calling module.
         if self._registered:
             return
         with self._lock:
             if not self._registered:
-                # The class docstring states the reason for this order.
+                # `logging` must be imported before this call; the class docstring states the reason.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

@@ -14,10 +14,7 @@ from urdfkin.errors import QuestionsSection
 
 
 def parse_xml(text: str) -> Element:
-    """Return the root element of a URDF.
-
-    Raise expat.ExpatError if the text is not well-formed.
-    """
+    """Return the root element of a URDF; raise expat.ExpatError if the text is not well-formed."""
     builder = TreeBuilder()
     # Without a namespace separator, expat ignores namespaces.
     parser = expat.ParserCreate("utf-8")
@@ -30,7 +27,7 @@ def parse_xml(text: str) -> Element:
 
 
 def joint_order_sentence(urdf: str, joints: Sequence[str]) -> str:
-    """Return a sentence that compares the joint orders of the URDF and q.
+    """Return a sentence that says whether the URDF has its joints in the same order as q.
 
     `joints` contains the names of the joints in the order of q.
     """

@@ -1,8 +1,8 @@
 """Child processes, and threads with a large stack.
 
-The current folder may contain untrusted files. With -c and -m, Python searches the current folder for modules
-first. Python would therefore run a file `json.py` beside a robot. The function `python_command` prevents this
-search. Libraries also search the current folder for settings files.
+The current folder may contain untrusted files. With the options -c and -m, Python searches the current folder
+for modules first. Python would therefore run a file `json.py` beside a robot. The function `python_command`
+prevents this search. Libraries also search the current folder for settings files.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from urdfkin.system.locks import make_fork_safe_lock
 
 #: Environment variables that a Python interpreter may need to start.
 _INHERITED_VARIABLES = ("LD_LIBRARY_PATH",)
-#: Linear algebra uses a single thread.
-#: A confined process has little address space for threads.
+#: Linear algebra uses a single thread, because a confined process has little address space for threads.
 _EXTRA_VARIABLES = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
     """Return a command that runs code in a new interpreter.
 
-    The new interpreter imports from the absolute paths in `sys.path`. Dask's temporary folder is excluded.
-    The folder with the package urdfkin is added. The current folder is not added.
+    The new interpreter imports from the absolute paths in `sys.path`, except Dask's temporary folder, and
+    from the folder that contains the package urdfkin. It searches the current folder only if the absolute
+    path of this folder is one of these paths, for example by PYTHONPATH.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_import_path()!r}; {code}"]
 
@@ -43,10 +43,7 @@ def _import_path() -> list[str]:
 
 
 def _is_dask_folder(entry: str) -> bool:
-    """Return whether an entry of `sys.path` is in Dask's temporary folder.
-
-    Other users can change this folder.
-    """
+    """Return whether an entry of `sys.path` is in Dask's temporary folder, which other users can change."""
     return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 
@@ -55,9 +52,8 @@ def run_python(
 ) -> tuple[bytes, int | None]:
     """Run a process with a minimal environment and a request on standard input.
 
-    The process is killed after `timeout` seconds. Output of more than `max_bytes` bytes also ends the
-    process. Return at most `max_bytes` + 1 bytes of output, and the exit status. After a timeout, the status
-    is None.
+    The process is killed after `timeout` seconds, or if the output exceeds `max_bytes` bytes. Return at most
+    `max_bytes` + 1 bytes of the output, and the exit status. After a timeout, the status is None.
     """
     import subprocess
 
@@ -93,9 +89,9 @@ def run_python(
 
 @contextmanager
 def leave_folder_with_settings(settings_file: str) -> Iterator[None]:
-    """Leave the current folder if this folder contains a settings file.
+    """Leave the current folder if it contains a settings file that must not be read.
 
-    The settings file must not be read. Inside the context, the current folder is `/`.
+    Inside the context, the current folder is then `/`.
     """
     if not os.path.lexists(settings_file):
         yield
@@ -116,9 +112,9 @@ _stack_size_lock = make_fork_safe_lock()
 
 
 def call_with_stack(size: int, function: Callable[[], _T]) -> _T:
-    """Return the result of `function` on a stack of at least `size` bytes.
+    """Call `function` on a stack of at least `size` bytes, and return the result.
 
-    Pinocchio and its parser are recursive. A chain of about 3,000 links overflows a stack of 8 MiB.
+    Pinocchio and its parser are recursive: a chain of about 3,000 links overflows a stack of 8 MiB.
     """
     from concurrent.futures import Future
 

@@ -21,10 +21,7 @@ def questions_page() -> Path:
 
 
 def _find_file(what: str, *paths: str) -> Path:
-    """Return the first existing path.
-
-    `paths` are relative to the folder that contains the package.
-    """
+    """Return the first path that exists; `paths` are relative to the folder that contains the package."""
     package_parent = Path(__file__).resolve().parents[2]
     if (file := next((path for path in map(package_parent.joinpath, paths) if path.is_file()), None)) is None:
         raise SourceError(

@@ -1,6 +1,7 @@
-"""Convert q, v, a and Jacobians between conventions of urdfkin and other programs.
+"""Convert q, v, a and Jacobians between urdfkin's convention and the conventions of other programs.
 
-A convention defines, for example, joint order, base velocity axes, and angle unit.
+A convention defines, for example, the order of the joints, the axes of the base's velocity, and the unit of
+angles.
 """
 
 from urdfkin.model.conventions.convention import (

@@ -13,8 +13,8 @@ convention, and change its settings and some of its joints:
     zero = 12.5                       # the program's value where the URDF's joint is at 0, in its unit
     unit = 4096                       # units of one turn; or "rad", "deg", "turn", "m", "mm"
 
-The joint value in the target program is `sign * factor * value + zero`. The number `value` is the URDF's
-joint value (rad or m). `factor` converts rad or m to `unit`.
+The joint value in the target program is `sign * factor * value + zero`. The number `value` is the joint value
+of the URDF in rad or m, and `factor` converts rad or m to `unit`.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class JointRule:
-    """The conversion of a joint value x (rad or m) to `factor * x + zero`.
+    """The conversion of a joint value x (rad or m) to another program's value, `factor * x + zero`.
 
     `factor` includes `sign`.
 
@@ -150,7 +150,7 @@ class Convention:
 
     @property
     def angle_unit(self) -> str:
-        """Unit of angles that a text may state ("90deg"). "": a text must not state a unit."""
+        """Unit of angles that a text may state, as in "90deg"; "" if a text must state no unit."""
         return "rad" if self.angle == "rad" else ""
 
 

@@ -7,9 +7,9 @@ The target program has these joint velocities, joint accelerations and Jacobians
     J_tool = S J M^-1
 
 M is the matrix `Conversion.matrix`, and M' is its time derivative. S exchanges the linear and the angular
-rows if the target program has the angular rows first. For floating and planar joints, urdfkin's v is in the
-child link's axes. The target program may use the parent link's axes instead. Then, and only then, M depends
-on q.
+rows if the target program has the angular rows first. urdfkin expresses the velocity of a floating or planar
+joint in the axes of the child link. M depends on q if, and only if, the target program expresses a part of
+this velocity in the axes of the parent link.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Allowed deviation from a mimic rule.
-#: The unit is the target program's, times max(1, |`_TargetNumber.factor`|, |expected value|).
+#: Allowed deviation from a mimic rule, relative to max(1, |`_TargetNumber.factor`|, |expected value|) in the
+#: target program's unit.
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -44,7 +44,7 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """A number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
 
-    With `cos_or_sin`, the number is the cosine or sine of this value.
+    If `cos_or_sin` is not empty, the number is the cosine or sine of this value.
     """
 
     name: str
@@ -64,8 +64,7 @@ class _FreeJoint:
     q_index: int  #: First index in urdfkin's q.
     v_index: int  #: First index in urdfkin's v.
     target_slice: slice  #: Indices in the target program's v.
-    #: (3,) link origin or centre of mass, link frame (m).
-    #: None: unknown.
+    #: (3,) position of the link's origin or centre of mass in the link's frame (m); None if it is unknown.
     velocity_point: FloatArray | None
 
 
@@ -173,7 +172,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The URDF text lacks a root joint that urdfkin added. The rank -1 sorts the root joint first.
+        # A root joint that urdfkin added is not in the URDF text. The rank -1 sorts the root joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -202,10 +201,10 @@ class Conversion:
 
         def below(link: int) -> list[int]:
             joints, links = list[int](), [link]
-            # The loop appends links, and visits the links later.
+            # The loop appends links to the list and visits these links later.
             for parent in links:
                 for i in children.get(parent, []):
-                    # A locked joint moves in the target program.
+                    # A locked joint is still a moving joint in the target program.
                     if self.tree.joints[i].original.kind.nv or not merge_fixed:
                         joints.append(i)
                     else:
@@ -261,7 +260,7 @@ class Conversion:
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
         is_mimic = bool(joint.mimic)
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
-            # Cosine and sine need rad, not the convention's angle unit.
+            # The cosine and sine need an angle in rad, whatever the convention's unit of angles is.
             size, sign = abs(factor), math.copysign(1.0, factor)
             self._columns += [
                 _TargetNumber(
@@ -313,7 +312,7 @@ class Conversion:
     def _centre_of_mass(self, link: str) -> FloatArray | None:
         """Return the centre of mass (3,) in the link's frame (m).
 
-        If the URDF has no centre of mass, the result is zero. None: The source's masses are unknown.
+        The result is zero if the URDF has no centre of mass, and None if the source's masses are unknown.
         """
         if not self._has_masses:
             return None
@@ -569,7 +568,7 @@ class Conversion:
     def _to_target_rates(
         self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
     ) -> FloatArray:
-        """Return M x + M' v, with x = `own_rates`. Without v, return M x."""
+        """Return M x + M' v for x = `own_rates`, or M x if `v` is None."""
         if self._same_v:
             return own_rates
         rates: FloatArray = own_rates[..., self._v_index]
@@ -725,7 +724,7 @@ class Conversion:
         return self.columns(q, self.reorder_six_vector(_as_matrices(J, "J", self.tree.nv), -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the columns of J to the target program: J M^-1.
+        """Convert the columns of a matrix J to the target program, as J M^-1.
 
         Each row of J must have the same meaning in both conventions.
 
@@ -869,7 +868,7 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the reordering from one convention to another for "q" or "v".
+    """Return the reordering that converts "q" or "v" from one convention to another, or None.
 
     The result is None if the robot has one of these numbers:
 
@@ -993,5 +992,5 @@ def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatAr
 
 
 def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
-    """Reshape matrices to (..., 1, k, l) for Jacobians of several frames."""
+    """Reshape a batch of matrices to (..., 1, k, l) for Jacobians of several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

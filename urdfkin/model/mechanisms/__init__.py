@@ -1,1 +1,1 @@
-"""Alignment and difference bounds of two mechanisms, for `same` and `dh --compare`."""
+"""The alignment of two mechanisms, and bounds on their difference, for `same` and `dh --compare`."""

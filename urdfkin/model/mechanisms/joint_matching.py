@@ -1,18 +1,18 @@
-"""Find corresponding joints of two mechanisms, and align their axes.
+"""Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
-The joints at two matched bodies are paired in three steps. First, joints are paired by the names in
-`name_map`, or by equal names. Second, joints are paired if the next bodies contain links with equal labels.
-By default, a link's label is the link's name. Third, the remaining joints of the same kind are paired by
-geometry. The most similar joints come first.
+The joints at two matched bodies are paired in three steps. First, joints are paired by the names that the
+user gives, or by equal names. Second, two joints are paired if the bodies after the joints contain links with
+equal labels. By default, a link's label is the link's name. Third, the remaining joints of the same kind are
+paired by geometry, the most similar joints first.
 
-Two subtrees match exactly if suitable zero offsets fulfil three conditions. Every axis of one subtree
-coincides with an axis of the other subtree. Links with equal labels coincide. The multipliers of the mimic
-rules correspond. `SubtreeMatcher.ignore_mimic_rules` removes the condition for multipliers.
+Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
+the other subtree. The zero offsets must also make links with equal labels coincide. The multipliers of the
+mimic rules must correspond; the method `SubtreeMatcher.ignore_mimic_rules` removes this condition.
 
-The value of the joint before a subtree does not matter. The joint's zero offset can compensate any value.
-Therefore, the result of a comparison depends on two inputs only. Input 1 is the pair of joints before the
-subtrees. Input 2 is the pose of B's joint axis relative to A's. `SubtreeMatcher` stores the result of each
-comparison. Therefore, the search is fast even for long chains.
+The value of the joint before a subtree does not matter, because the joint's zero offset can compensate any
+value. Therefore, the result of a comparison depends on two things only: the two joints before the subtrees,
+and the pose of B's joint axis relative to A's joint axis. `SubtreeMatcher` stores the result of each
+comparison, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class JointMatcher:
     def pair_joints(
         self, bodies: tuple[int, int], via: PreviousEdges, motion_a: FloatArray, motion_b: FloatArray
     ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
-        """Return joint pairs, unpaired joints of A, and unpaired joints of B.
+        """Return joint pairs at two bodies, unpaired joints of A, and unpaired joints of B.
 
         `BodyPair` describes the arguments.
         """
@@ -133,7 +133,7 @@ class JointMatcher:
         return self._subtree_shape(self.a, bodies[0], e) == self._subtree_shape(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis at A's body coincides with one of B's.
+        """Return whether each joint axis at A's body coincides with a joint axis at B's body.
 
         X (4, 4) moves B before the comparison.
         """
@@ -150,9 +150,9 @@ class JointMatcher:
     def rank_candidates(
         self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray
     ) -> list[Edge]:
-        """Return the joints of B that `name_map` does not contain.
+        """Return the joints in `edges` that are not in `name_map`, the joint most similar to `e` first.
 
-        The joint most similar to `e` comes first. X (4, 4) moves B before the comparison.
+        `e` is a joint of A, and `edges` are joints of B. X (4, 4) moves B before the comparison.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -240,7 +240,7 @@ class _JointGeometry:
 
 
 def _line_difference(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
-    if kind == "floating":  # a floating joint reaches every pose
+    if kind == "floating":  # any two floating joints agree, because a floating joint reaches every pose
         return 0.0, 0.0
     return line_difference(s, t, with_distance=kind == "turns")
 
@@ -267,12 +267,12 @@ class Axis:
         return replace(self, screw=self.screw.transform(T), reference_line=self.reference_line.transform(T))
 
     def nearest_point_coordinate(self, u: FloatArray) -> float | None:
-        """Return the coordinate along u (m) of the reference line's nearest point.
+        """Return the coordinate along u (m) of the reference line's point that is nearest to the axis.
 
-        The point is nearest to the axis. The result is None for prismatic joints and parallel lines.
+        The result is None for prismatic joints and parallel lines.
         """
         s, start = self.screw, self.reference_line
-        # 1 - cos^2 loses all digits at angles below 1e-8.
+        # A formula with 1 - cos^2 of the angle loses all digits at angles below 1e-8.
         normal = np.cross(start.direction, s.direction)
         squared_sine = float(normal @ normal)
         if not self.turns or squared_sine < PARALLEL_TOLERANCE**2:
@@ -282,10 +282,7 @@ class Axis:
 
 
 def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
-    """Yield joint values (rad or m) at which the axes may coincide.
-
-    The joint moves `axis_b` about or along u.
-    """
+    """Yield values (rad or m) of the joint with axis u at which `axis_b` may coincide with `axis_a`."""
     if not turns:
         coordinates = (
             axis_a.nearest_point_coordinate(u.direction),
@@ -310,9 +307,8 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
             yield candidate
 
 
-#: Axes are nearly parallel if sin(angle) is below this value.
-#: An error of one axis moves the axes' nearest points.
-#: Nearly parallel axes can magnify the error over 100 times.
+#: Two axes are nearly parallel if the sine of their angle is below this value. An error of one axis can then
+#: move the nearest points of the axes by more than 100 times the error.
 _NEARLY_PARALLEL_SINE = 1e-2
 
 
@@ -327,9 +323,10 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes of A and B after the joints `via`.
 
-    A branch ends at the first axis not nearly parallel to `reference_line[0]`. Nearly parallel axes determine
-    zero offsets inexactly. With `past_prismatic`, a branch ends only at a revolute axis. A prismatic axis has
-    no position. Behind a planar joint, the axes determine only heights above its plane.
+    A branch ends at the first axis that is not nearly parallel to `reference_line[0]`, because nearly
+    parallel axes determine zero offsets inexactly. With `past_prismatic`, the branch continues after such an
+    axis if the joint is prismatic, because a prismatic axis has no position. Behind a planar joint, the axes
+    determine only heights above its plane.
     """
     behind_plane |= via[0] is not None and _motion_type(mechanisms[0], via[0]) == "planar"
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -353,20 +350,18 @@ def later_axes(
             )
 
 
-#: Maximum number of Gauss-Newton steps; two steps are usually enough.
-#: Axes with angles up to 1e-8 rad need more steps.
-#: Then one step can change an angle by 1 rad.
+#: Maximum number of Gauss-Newton steps. Two steps are usually enough. If axes are parallel up to 1e-8 rad,
+#: more steps are necessary, and one step can change an angle by 1 rad.
 _REFINEMENT_STEPS = 10
 #: The fit stops if |step| (rad, m) is below this value.
 _NEGLIGIBLE_CHANGE = 1e-14
 
 
 def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoices:
-    """Solve for B's root pose and all zero offsets together.
+    """Solve for B's root pose and all zero offsets together, so that all axes of B coincide with axes of A.
 
-    The solution makes all axes of B coincide with axes of A. `MechanismMatcher` finds one zero offset after
-    another. The matcher fails if an axis depends on two unknown offsets. Nearly parallel axes can magnify
-    rounding errors, so that the matcher fails.
+    `MechanismMatcher` finds one zero offset after another. This fails if an axis depends on two unknown
+    offsets, or if nearly parallel axes magnify the rounding error of an offset.
 
     Args:
         alignment: Every joint is revolute or prismatic.
@@ -374,7 +369,7 @@ def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoice
     """
     size = size_of(alignment.a, alignment.b)
     turns = np.array([step.kind == "turns" for step in alignment.steps])
-    # A rotation of 1 rad displaces links by about `size`.
+    # A rotation of 1 rad and a shift by `size` displace links by about the same distance.
     scales = np.concatenate(([1.0] * 3, [size] * 3, np.where(turns, 1.0, size)))
     X, offsets = alignment.X, np.array([step.offset for step in alignment.steps])
     for _ in range(_REFINEMENT_STEPS):
@@ -383,8 +378,7 @@ def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoice
         X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
         if np.abs(change).max() < _NEGLIGIBLE_CHANGE:
             break
-        # Nearly coincident axes can give steps of many turns.
-        # Large angles have large rounding errors.
+        # If two axes nearly coincide, a step can add many turns. Large angles have large rounding errors.
         offsets = np.where(turns & (np.abs(offsets) > pi), np.remainder(offsets + pi, 2.0 * pi) - pi, offsets)
     joints = alignment.a.tree.joints
     zeros = {joints[s.a].name: (s.sense, float(x)) for s, x in zip(alignment.steps, offsets, strict=True)}
@@ -394,16 +388,15 @@ def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoice
 def _errors(
     alignment: Alignment, X: FloatArray, offsets: FloatArray, size: float, *, with_links: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Return differences (k,) of axes and links, and derivatives (k, 6 + n).
+    """Return the differences (k,) of axes and links, m, and their derivatives (k, 6 + n).
 
-    The first 6 derivatives belong to B's root twist in A's root frame. The last n derivatives belong to
-    the zero offsets. The differences are in m; angles are multiplied by `size`.
+    The derivatives are with respect to a twist of B's root in A's root frame, and to the n zero offsets.
+    Angles are multiplied by `size`.
     """
     b, n = alignment.b, len(offsets)
     edges = {edge.joint: edge for edge in b.edges}
     root = b.body_of[alignment.base[1]], X, np.eye(6, 6 + n)
-    # B's bodies after each joint pair, with the bodies' motions.
-    # The arrays (6, 6 + n) are twist derivatives.
+    # For each joint pair: B's body after the joint, its motion, and the derivatives (6, 6 + n) of its twist.
     after = list[tuple[int, FloatArray, FloatArray]]()
     errors, derivatives = list[FloatArray](), list[FloatArray]()
     for i, step in enumerate(alignment.steps):
@@ -434,20 +427,19 @@ def _errors(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align two axes of A and B.
+    """Yield poses of B's root that align an axis of B with an axis of A.
 
-    Other axes determine the rotation about A's axis and the shift along it. The default is 0.
+    The rotation about A's axis and the shift along A's axis are 0 unless other axes determine them.
     """
     firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after, further in firsts:
         lines = axis_a.screw, axis_b.screw
-        # The axes after `axis_a` may not determine B's root pose.
-        # `more` contains further axes: after prismatic joints, and in other branches.
-        # Example: the rotors of a drone.
+        # If the axes after `axis_a` do not determine the pose of B's root, other axes are used: axes after a
+        # prismatic joint, and axes of other branches, such as the rotors of a drone.
         more = [*further, *(_with_reference_lines(lines, *pair) for pair, *_ in firsts)]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
-            # A rotation about an axis keeps coordinates along this axis.
+            # A rotation about A's axis does not change coordinates along this axis.
             shifts = _candidates(axis_a.screw, K, after, more, turns=False)
             for angle in _candidates(axis_a.screw, K, [*before, *after], more, turns=True):
                 X = screw_motion(axis_a.screw, angle, turns=True) @ K
@@ -458,11 +450,10 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], have_equal_subtrees: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align up to three joint axes.
+    """Yield poses of B's root that align up to three joint axes, all at one body of A and one body of B.
 
-    The axes are at one body of A and one body of B.
-
-    The aligned axes or later axes determine the shift along the first axis. The default is 0.
+    If the aligned axes do not determine the shift along the first axis, later axes determine it. The default
+    is 0.
     """
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
@@ -492,8 +483,8 @@ def root_poses_by_siblings(
                 for h, one in axes_b[i]
                 if h is not f and h is not g
             ]
-            # The axis of a prismatic joint has no position.
-            # Axes after the joint can determine the shift along u.
+            # The axis of a prismatic joint has no position. The axes after the prismatic joint can determine
+            # the shift along u.
             if _motion_type(a, edges[second]) == "prismatic":
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 next_joints = _next_joints((a, b), (edges[second], g), carried)
@@ -534,11 +525,10 @@ def _first_revolute_axes(
     bodies: Both[int],
     earlier_pairs: tuple[Both[Axis], ...],
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]], list[Both[Axis]]]]:
-    """Pair the first revolute axes of all branches of A and B.
+    """Pair the first revolute axis of each branch of A with the first revolute axis of each branch of B.
 
-    An item contains the pair, earlier pairs of prismatic axes, and two lists. The lists are results of
-    `later_axes`. The second list uses `past_prismatic`. Branches without revolute axes give their last pair
-    of prismatic axes.
+    Each item contains the pair, the earlier pairs of prismatic axes, and the results of `later_axes` without
+    and with `past_prismatic`. Branches without revolute axes give their last pair of prismatic axes.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -583,17 +573,14 @@ def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None)
     return Axis(screw, mechanism.joint(edge).kind.turns, reference_line or screw)
 
 
-#: Function that proposes poses of B's next body.
-#: Argument 1: the next bodies of A and B.
-#: Argument 2: the joints before the next bodies.
-#: Argument 3: the pose (4, 4) of B's current body.
+#: Function that proposes poses of B's next body. The arguments are the next bodies of A and B, the joints
+#: before them, and the pose (4, 4) of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
-#: Maximum number of joint pairs in an exact search.
-#: The maximum applies to each pair of bodies.
+#: Maximum number of joint pairs that an exact search tries for each pair of bodies.
 MAX_ASSIGNMENTS = 5000
 
-#: Coordinate of A -> (coordinate of B, B's velocity / A's velocity).
+#: Map from a coordinate of A to the matching coordinate of B, and B's velocity divided by A's velocity.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 
@@ -602,7 +589,7 @@ class _Match:
     """An exact match of two subtrees.
 
     Attributes:
-        X: (4, 4) motion from B's next body to A's next body. Both robots have the zero configuration.
+        X: (4, 4) motion that moves B's next body to A's next body, in the zero configuration.
     """
 
     X: FloatArray
@@ -631,7 +618,7 @@ class SubtreeMatcher:
     def exact_joint_pairs(
         self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
     ) -> Sequence[EdgePair] | None:
-        """Return joint pairs at two bodies; None without an exact match.
+        """Return pairs of the joints at two bodies; None if the bodies' subtrees do not match exactly.
 
         X (4, 4) moves B before the comparison.
         """
@@ -639,7 +626,7 @@ class SubtreeMatcher:
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return `_Match.X` of the next bodies; None without an exact match."""
+        """Return `_Match.X` for the bodies after the joints e and f; None without an exact match."""
         found = self._match_subtrees(e, f, bodies, X)
         return None if found is None else found.X
 
@@ -734,7 +721,7 @@ class SubtreeMatcher:
         return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether X and `other` differ only by a motion of joint e.
+        """Return whether B's poses X and `other` differ only by a motion of A's joint e.
 
         For a planar joint, the poses must be equal.
         """

@@ -1,13 +1,12 @@
-"""Align mechanism B with mechanism A.
+"""Align mechanism B with mechanism A: match their joints, and find the sign and zero offset of each joint.
 
-An alignment matches the joints, and contains each joint's sign and zero offset.
+`MechanismMatcher` starts at a body of A and a body of B, and visits both trees joint by joint. At each joint,
+the matcher chooses the sign (`sense`) and the zero offset. The best choice makes the largest number of later
+links and axes of B coincide with links and axes of A. `align` compares the results for several starting
+bodies and joint orders.
 
-`MechanismMatcher` starts at one body of A and one body of B. The matcher visits both trees joint by joint. At
-each joint, the matcher chooses the sign (`sense`) and the zero offset. The best choice has the largest number
-of coincident later links and axes. `align` compares the results for several starting bodies and joint orders.
-
-A joint can have no later axis and no later link frame. Only mimic rules can determine the zero offset of such
-a joint. The class `_RulePair` contains the equations.
+If no axis and no link frame follows a joint, only mimic rules can determine the joint's zero offset. The
+class `_RulePair` contains the equations.
 """
 
 from __future__ import annotations
@@ -53,32 +52,30 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Maximum tree depth (joints) for the exact, recursive search.
+#: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MAX_EXACT_SEARCH_DEPTH = 200
-#: Maximum number of later joints per branch in a comparison.
-#: Comparisons of later joints decide between equally good choices.
+#: Maximum number of later joints on each branch that decide between equally good choices at a joint.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of root poses that axes give the exact search.
-#: The maximum applies to each pair of bodies.
+#: Maximum number of root poses that the exact search computes from axes, for each pair of bodies.
 MAX_ROOT_POSES = 48
-#: Maximum number of start body pairs for the exact search.
-#: The two bodies of a pair have equal labels.
+#: Maximum number of pairs of start bodies for the exact search. The two bodies of a pair have links with
+#: equal labels.
 MAX_SHARED_BODIES = 8
-#: A score is better if `difference < BETTER_RATIO * other_difference`.
-#: The rule applies to scores with equal counts.
+#: Of two scores with equal counts, a score is better if its largest difference is less than BETTER_RATIO
+#: times the other's.
 BETTER_RATIO = 0.5
 
-#: Zero offset (rad or m) or pose (4, 4).
+#: A zero offset (rad or m), or a pose for a planar or floating joint.
 _OffsetOrPose = TypeVar("_OffsetOrPose", float, FloatArray)
-#: Number of agreeing links and axes, and largest difference (m).
+#: Number of links and axes of A that agree with B, and the largest difference (m).
 Score = tuple[int, float]
 
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the number of later joint pairs in comparisons.
+    """A limit on the number of later joint pairs that decide between equally good choices.
 
-    The comparisons decide between equally good choices. Several matchers can share a limit.
+    Several matchers can share a limit.
     """
 
     remaining: int
@@ -88,7 +85,7 @@ class LookAhead:
 class BodyPair:
     """A body of A and the corresponding body of B.
 
-    Two links with the zero poses Z_a and Z_b agree if:
+    A link of A with the zero pose Z_a and a link of B with the zero pose Z_b agree if:
 
     `motion_a @ Z_a = motion_b @ Z_b`.
 
@@ -96,7 +93,7 @@ class BodyPair:
         via: The joints before the bodies. None at the start of the search.
         previous: Index of the joints `via` in `Alignment.steps`, or -1.
         motion_a: (4, 4) product of the motions L at earlier joints.
-        motion_b: (4, 4) product of the root pose, earlier zero offsets and earlier conversions.
+        motion_b: (4, 4) product of the root pose and the motions by earlier zero offsets and conversions.
     """
 
     bodies: tuple[int, int]
@@ -110,7 +107,7 @@ class MechanismMatcher:
     """Match the joints of two mechanisms.
 
     `choices` prescribes B's root pose, signs, zero offsets and conversions. `base` contains the indices of
-    the start links in A and B. If an argument is None, the matcher finds the values.
+    the links of A and B where the search starts. If an argument is None, the matcher finds the values.
     """
 
     def __init__(
@@ -154,7 +151,7 @@ class MechanismMatcher:
     def find_best_with_names(self) -> Alignment:
         """Return the best alignment that separates no links with equal labels.
 
-        If every alignment separates links, return an arbitrary alignment.
+        If every alignment separates such links, return one of these alignments.
         """
         best: Alignment | None = None
         self.exact = None
@@ -174,7 +171,7 @@ class MechanismMatcher:
         return None if start is None else self._match_from(*start)
 
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield start bodies, and B's root pose (4, 4) in A's root frame."""
+        """Yield the start of each search: two bodies, and the pose (4, 4) of B's root in A's root frame."""
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -211,8 +208,8 @@ class MechanismMatcher:
     def _match_count_bound(self, base: tuple[int, int]) -> int:
         """Return an upper bound on `match_count` for two start bodies.
 
-        Branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
-        Pairing the branches by decreasing size makes the sum of the bounds largest.
+        Two branches with m and n joints have at most min(m, n) joint pairs, and the same bound holds for
+        links. The sum of these bounds is largest if the branches of A and B are paired by decreasing size.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -262,8 +259,7 @@ class MechanismMatcher:
             yield 0, body_b
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
-        # B's root can correspond to a later body of A.
-        # Example: A has a floating root joint.
+        # B's root body can correspond to a body of A that follows a joint, such as a floating root joint.
         body_a = _find_shared_body(self.b, self.a)
         if body_a is not None:
             yield body_a, 0
@@ -306,8 +302,8 @@ class MechanismMatcher:
             pairs, only_a, only_b = self._joint_pairs(body_pair)
             alignment.only_a += _joints_in_subtrees(self.a, body_pair.bodies[0], only_a)
             alignment.only_b += _joints_in_subtrees(self.b, body_pair.bodies[1], only_b)
-            # A recheck can find the same pairs in another order.
-            # Therefore, the pairs are sorted.
+            # The pairs are sorted, because a recheck finds all pairs by name and can find them in another
+            # order.
             for e, f in sorted(pairs, key=lambda pair: pair[0].joint):
                 step, next_pair, _ = self._match_joints(
                     body_pair, e, f, len(alignment.steps), LOOK_AHEAD_DEPTH
@@ -375,10 +371,7 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair two links as end-effector frames.
-
-        The links have unshared labels, and the bodies have no matched links.
-        """
+        """Pair two links with unshared labels as end-effector frames, if the bodies have no matched links."""
         links_a, links_b = self._unshared_links(body_pair)
         if matched or not links_a or not links_b:
             return None
@@ -491,8 +484,8 @@ class MechanismMatcher:
             )
         body_pairs = ((N, replace(next_pair, motion_b=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
-        # The joint poses satisfy P_b = M P_a N.
-        # A path from child to parent inverts the model's P.
+        # The joint has the pose P_a in A and the pose P_b = M P_a N in B. If a model's path leads from the
+        # joint's child to its parent, the model's pose is inverted.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (
             IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
@@ -511,8 +504,8 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N in P_b = M P_a N.
 
-        `compensation` is one possible N of a planar joint. A floating joint has no `compensation`. `pose_a`
-        includes `motion_a`.
+        `compensation` is one possible N of a planar joint, or None for a floating joint. `pose_a` includes
+        `motion_a`.
         """
         yield IDENTITY if compensation is None else compensation
         candidates = [next_pair.motion_b]
@@ -560,9 +553,8 @@ class MechanismMatcher:
                 next_pair, body_pair.motion_a, screw_b, turns, zero, depth
             )
             return replace(step, offset=offset), next_pair, score
-        # The motion K moves A's axis to B's axis.
-        # Case 1: later bodies of B also move by K.
-        # Case 2: only the axis moves.
+        # The motion K moves A's axis to B's axis. The matcher compares two cases: all later bodies of B also
+        # move by K, or only the axis moves.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.motion_a)
         with_bodies = self._best_zero(next_pair, K @ body_pair.motion_a, screw_b, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -635,7 +627,7 @@ class MechanismMatcher:
                 continue
             score = self._score(body_pair)
             scored.append((choice, body_pair, score))
-            # All axes and links agree. No choice can be better.
+            # All axes and links agree, so the remaining choices cannot be better.
             if not score[1] and self.joint_matcher.link_pairs(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
@@ -721,8 +713,7 @@ def _best_of(
 
 
 def _is_better_alignment(one: Alignment, than: Alignment) -> bool:
-    # A convention chooses a table's link frames.
-    # Therefore, the agreement of the joints comes first.
+    # A convention chooses the link frames of a table, so the agreement of the joints comes first.
     if one.has_free_frames and one.all_joints_agree != than.all_joints_agree:
         return one.all_joints_agree
     return is_better(one.score, than.score)
@@ -758,29 +749,25 @@ def _joints_in_subtrees(mechanism: Mechanism, body: int, edges: Sequence[Edge]) 
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest rotation (4, 4) that makes two planes parallel.
-
-    The function also returns the rotation angle (rad) and the shift 0.
-    """
+    """Return the smallest rotation (4, 4) that makes two planes parallel, its angle (rad) and the shift 0."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
         start, end.reverse() if start.direction @ end.direction < 0.0 else end, turns=False
     )
 
 
-#: Maximum number of attempted orders for each run of joints.
-#: Five prismatic joints have 120 orders.
+#: Maximum number of orders that are tried for each run of consecutive joints of B. Five prismatic joints have
+#: 120 orders.
 MAX_ORDERS = 120
-#: Maximum number of later joint pairs in comparisons; see `LookAhead`.
-#: Robots without equal names and exact match need many pairs.
-#: Examples: up to 500 pairs for TALOS, 1,000 for Baxter.
+#: Maximum number of later joint pairs that a search compares; see `LookAhead`. Without names and without an
+#: exact match, the robot TALOS needs up to 500 pairs, and Baxter up to 1,000.
 MAX_LOOK_AHEAD_PAIRS = 2000
-#: Larger angle tolerances (rad), in the order of the attempts.
+#: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 #: Maximum number of zero offsets that one fit computes.
 #: A fit of n zero offsets takes O(n^3) time.
 MAX_REFINED_JOINTS = 100
-#: Maximum number of attempts to exchange partners of joint pairs.
+#: Maximum number of attempts to exchange the partners of two joint pairs.
 MAX_EXCHANGES = 12
 
 
@@ -835,7 +822,7 @@ def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
     for step in best.steps:
         name = best.a.tree.joints[step.a].name
         if step.previous < 0 and name in zeros and _is_compensated_by_base(best, step):
-            # B's root pose compensates the change of the zero offset.
+            # The pose of B's root compensates the change of the zero offset.
             edge = next(edge for edge in best.b.edges if edge.joint == step.b)
             screw = _outwards(best.b.screw(edge), edge.outer == best.b.body_of[best.base[1]])
             change = step.offset - zeros[name][1]
@@ -852,10 +839,7 @@ def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Exchange the partners of two joint pairs if the alignment improves.
-
-    Example: the robot has mirrored arms.
-    """
+    """Exchange the partners of two joint pairs, for example of mirrored arms, if the alignment improves."""
     # An exchange cannot match joints that only one model has.
     if best.only_a or best.only_b:
         return best
@@ -891,10 +875,7 @@ def _with_another_start(best: Alignment, b: Mechanism, name_map: Mapping[str, st
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Align again with larger tolerances.
-
-    All axes may differ by more than the normal tolerance.
-    """
+    """Align again with larger tolerances, because axes may all differ by more than the normal tolerance."""
     if best.all_joints_agree and best.has_free_frames:
         return best
     a, b, (least, most), look_ahead = (
@@ -918,10 +899,10 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
 
 
 def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Solve for B's root pose and all zero offsets together.
+    """If axes or links do not agree, solve for B's root pose and all zero offsets together.
 
-    The fit applies if axes or links do not agree. The frames of a table do not determine zero offsets. Nearly
-    parallel axes determine the zero offsets only together.
+    The frames of a table do not determine zero offsets. Nearly parallel axes determine the zero offsets only
+    together.
     """
     agrees = best.all_joints_agree if best.has_free_frames else best.is_complete
     if agrees or best.only_a or best.only_b or not 0 < len(best.steps) <= MAX_REFINED_JOINTS:
@@ -965,12 +946,11 @@ def _best_alignment(
     return matcher.find_best() if separates_names else matcher.find_best_with_names()
 
 
-#: Changes of a revolute joint's zero offset, in full turns.
-#: The changed zero offset fits the mimic rules.
+#: Full turns that may be added to the zero offset of a revolute joint, so that the offset fits the mimic
+#: rules.
 FULL_TURNS = (0, 1, -1)
-#: Maximum relative change of a zero offset, divided by `Tolerance.angle`.
-#: Mimic rules change the zero offset.
-#: Zero offsets are inexact if two joint axes nearly coincide.
+#: Allowed change of a computed zero offset by mimic rules, as a multiple of the angle tolerance. A computed
+#: zero offset is inexact if the axes of the joint and of a later joint nearly coincide.
 OFFSET_TOLERANCE_FACTOR = 1e4
 
 
@@ -978,12 +958,9 @@ OFFSET_TOLERANCE_FACTOR = 1e4
 class _RulePair:
     """The mimic rules of two matched joints.
 
-    Let x be a coordinate of A, and y a coordinate of B. A's joint has the value `m x + c`. B's joint has the
-    value `n y + d`. Let s be the sign (1 or -1), and o the zero offset. The values agree if:
-
-    `n y + d = s (m x + c) + o`.
-
-    Therefore, the rules require `y = alpha x + beta`.
+    A's joint has the value `m x + c`, where x is a coordinate of A. B's joint has the value `n y + d`, where
+    y is a coordinate of B. The values agree if `n y + d = s (m x + c) + o`, with the sign s (1 or -1) and the
+    zero offset o. Therefore, the rules require `y = alpha x + beta`.
 
     Attributes:
         slope_a: The slope s m.
@@ -991,7 +968,7 @@ class _RulePair:
         slope_b: The slope n.
         constant_b: The constant d.
         offset: The zero offset o.
-        is_free: Whether o can have any value. No later link or axis then determines o.
+        is_free: Whether o can have any value, because no later link or axis determines o.
         has_effect: Whether the joint moves matched links or later axes.
     """
 
@@ -1026,15 +1003,12 @@ class _RulePair:
 
 
 def zeros_by_mimic_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return zero offsets (rad or m) that fit the mimic rules.
-
-    The result maps joint names of A to signs and new zero offsets.
-    """
+    """Map joint names of A to signs and new zero offsets (rad or m) that fit the mimic rules."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _group_rule_pairs(alignment):
         alphas = [rule.slope_a / rule.slope_b for rule in rules if rule.slope_b]
-        # Each rule pair requires y = alpha x + beta.
-        # Only rules with the most frequent alpha change zero offsets.
+        # The rules of each joint pair require y = alpha x + beta for the coordinates x of A and y of B. Joint
+        # pairs can differ in alpha, so only the pairs with the most frequent alpha get new zero offsets.
         alpha = max(
             alphas, key=lambda one: sum(_are_close(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -1083,9 +1057,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_compensated_by_base(alignment: Alignment, step: MatchedJoints) -> bool:
-    """Return whether B's root pose can compensate any zero offset.
+    """Return whether the pose of B's root can compensate any zero offset of a joint pair.
 
-    The joint pair must be the only joint pair at the base. Links with equal labels must not be at the base.
+    This requires that the joint pair is the only one at the base, and that no links with equal labels are at
+    the base.
     """
     frames = [frame for frame in alignment.frames if frame.previous < 0]
     names = set(alignment.b.labels)
@@ -1101,7 +1076,7 @@ def _is_compensated_by_base(alignment: Alignment, step: MatchedJoints) -> bool:
 
 
 def _find_effects(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return `not _RulePair.is_free` and `_RulePair.has_effect` for pair i."""
+    """Return whether later links or axes determine the zero offset of pair i, and `_RulePair.has_effect`."""
     if _is_compensated_by_base(alignment, alignment.steps[i]):
         return False, True
     names = set(alignment.a.labels) & set(alignment.b.labels)

@@ -1,35 +1,32 @@
-"""Describe robots by rigid bodies and joint screws, and align two such robots.
+"""Describe robots by rigid bodies and joint screws in the zero configuration, and align two such robots.
 
-The product of exponentials defines the pose of a link:
+By the product of exponentials, the pose of a link is:
 
-`exp(S_1 t_1) ... exp(S_n t_n) H`.
+`exp(S_1 t_1) ... exp(S_n t_n) H`
 
-The unit screws S_i describe the joint axes in the zero configuration. H is the link's pose in the zero
-configuration. All S_i and H use one common frame. The constant poses between the joints are not factors of
-this product. Merging links that are fixed to each other does not change the product. Any body may be the
-root. A path from the root can cross a joint from child to parent. The joint's screw is then reversed.
+The unit screws S_i describe the joint axes, and H is the link's pose. Both apply to the zero configuration,
+and use one common frame. The constant poses between the joints are not factors of this product. Therefore,
+the product does not change if links that are fixed to each other are merged. Any body may be the root. If a
+path from the root leads from the child link of a joint to the parent link, the joint's screw is reversed.
 
-Planar and floating joints:
+**Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
+different frames for the joint. The constant rigid motion M describes this difference. A and B may also define
+different frames for the body after the joint. The constant rigid motion N describes this second difference. A
+and B move in the same way if:
 
-The coordinates of a planar or floating joint describe a pose P. The models A and B may use different joint
-frames. The constant rigid motion M converts between the joint frames. A and B may also use different frames
-of the next body. The constant rigid motion N converts between the body frames. A and B move in the same way
-if:
+`P_b = M P_a N`
 
-`P_b = M P_a N`.
+If the joint is reversed in one model, P_a^-1 replaces P_a.
 
-If one model reverses the joint, P_a^-1 replaces P_a.
+For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses, which are
+translations and rotations in the joint's plane. Therefore, M P N must be a planar pose for every planar pose
+P. If M raises the plane by some distance, N must lower the plane by the same distance. If M turns the plane
+over, N must also turn the plane over.
 
-For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses. Planar poses
-are translations and rotations in the joint's plane. Therefore, M P N must be planar for every planar pose P.
-If M raises the plane by h, N must lower it by h. If M turns the plane over, N must also turn the plane over.
-
-Alignment:
-
-The matcher starts at two corresponding bodies of A and B. A and B are in the zero configuration. The rigid
-motion G moves A's body to the corresponding body of B. A joint of A has the screw S and the value t. The
-joint moves the later bodies by exp(S t). The matched joint of B moves the corresponding bodies by exp(S' t').
-S' and t' use the positive direction and the zero of A's joint. The displaced parts of B determine the effect:
+**Alignment.** The matcher starts at a body of A and the corresponding body of B, both in the zero
+configuration. The rigid motion G moves A's body to B's body. A joint of A with the screw S and the value t
+moves the later bodies by exp(S t). The matched joint of B moves the corresponding bodies by exp(S' t'). S'
+and t' use the positive direction and the zero of A's joint. The displaced parts of B determine the effect:
 
 | displaced parts of B | effect |
 |---|---|
@@ -40,22 +37,18 @@ S' and t' use the positive direction and the zero of A's joint. The displaced pa
 The link poses of A and B are:
 
 `T_A = exp(S_1 t_1) ... exp(S_n t_n) H`
-`T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H`.
+`T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H`
 
-Each L is expressed in A's root frame in the zero configuration. If A and B agree at joint i:
+Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i, then
+S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all joints and links, the two models have
+the same motion. If A and B differ at a joint or link, the motions of the two models usually differ. There are
+exceptions. For example, two consecutive revolute joints may rotate about the same line. The later links then
+depend only on the sum of the two angles.
 
-`S'_i = S_i, t'_i = t_i, L_i = 1`.
-
-Models that agree at all joints and links have the same motion. Models that differ at a joint or link usually
-have different motions. There are exceptions. For example, two consecutive revolute joints may rotate about
-the same line. The later links then depend only on the sum of the angles.
-
-Variables:
-
-Each joint value is a function `slope * variable + constant`. Each coordinate of A is a variable. Most
-coordinates of B are functions of these variables. The joint's sign and zero offset determine `slope` and
-`constant`. The remaining coordinates of B are additional variables. An example is B's moving joint that is
-matched with a fixed joint.
+**Variables.** Each joint value of A or B is a function `slope * variable + constant`. Each coordinate of A is
+a variable. Most coordinates of B are functions of these variables; the sign and the zero offset of the joint
+determine the slope and the constant. The remaining coordinates of B are additional variables. For example, if
+A's joint is fixed and B's joint moves, the coordinate of B's joint is an additional variable.
 """
 
 from __future__ import annotations
@@ -80,13 +73,13 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: Minimum perpendicular component of a vector that is not parallel.
-#: The vector is a unit vector or a distance (m).
+#: A vector counts as parallel to an axis if its perpendicular component is shorter than this value. The
+#: vector is a unit vector, or a distance vector in m.
 PARALLEL_TOLERANCE = 1e-12
 
 
 def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
-    """Return the motion exp(S t) (4, 4); t is in rad or m."""
+    """Return the motion exp(S t) (4, 4) for a value t (rad or m)."""
     if not turns:
         return pose(p=screw.direction * value)
     R = rotation_about(screw.direction, value)
@@ -110,10 +103,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
 
 
 def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """Return the smallest rotation that maps u to v, and its angle (rad).
-
-    The vectors u and v are unit vectors.
-    """
+    """Return the smallest rotation from the unit vector u to the unit vector v, and its angle (rad)."""
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
@@ -132,16 +122,13 @@ def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 
 def angle_about(u: FloatArray, R: FloatArray) -> float:
-    """Return the angle (rad) of the rotation about u nearest to R."""
+    """Return the angle (rad) of the rotation about u that is nearest to R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """Return the angle (rad) about u from x to y.
-
-    The result is None if x or y is parallel to u.
-    """
+    """Return the angle (rad) about u from x to y; None if x or y is parallel to u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
     if min(np.linalg.norm(x), np.linalg.norm(y)) < PARALLEL_TOLERANCE:
         return None
@@ -177,10 +164,7 @@ class FreeJointConversion:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Check the rigid motions M and N for a joint kind.
-
-        The joint must reach M P N for two test poses P.
-        """
+        """Return whether M and N are rigid motions, and the joint can reach M P N for two poses P."""
         if not all(is_joint_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _TEST_COORDINATES)
@@ -224,7 +208,7 @@ def is_joint_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def planar_angle(P: FloatArray) -> FloatArray:
-    """Return the angle (rad) of the rotation about z nearest to P."""
+    """Return the angle (rad) of the rotation about z that is nearest to the rotation of the pose P."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
@@ -233,7 +217,7 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 
 
 def out_of_plane_compensation(M: FloatArray) -> FloatArray:
-    """Return N so that M P N is planar for every planar P.
+    """Return a motion N for which M P N is planar for every planar pose P.
 
     The rotation of M must map the plane's normal z to z or -z.
 
@@ -242,7 +226,7 @@ def out_of_plane_compensation(M: FloatArray) -> FloatArray:
     | z | `E T` | `T^-1` |
     | -z | `E T F` | `F T^-1` |
 
-    E is a motion in the plane. T is a translation along the normal. F is half a turn about x.
+    E is a motion in the plane, T is a translation along the normal, and F is half a turn about x.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -280,9 +264,9 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        separating_joints: Indices (`tree.joints`) of fixed joints with moving partners in the other model.
+        separating_joints: Indices in `tree.joints` of fixed joints that are moving joints in the other model.
         labels: Label of each link, by default its name. Links with equal labels are paired.
-        free_frames: Whether a convention chooses the link frames. Example: a Denavit-Hartenberg table.
+        free_frames: Whether a convention chooses the links' frames, as in a Denavit-Hartenberg table.
 
     Attributes:
         zero_poses: (4, 4) pose of each link in the root frame.
@@ -330,7 +314,7 @@ class Mechanism:
     def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy in which the joints have the order `names`.
 
-        `allows_order(names)` must be true. Links between exchanged joints are omitted.
+        `allows_order(names)` must be true. A link between two joints that change places is omitted.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -346,14 +330,14 @@ class Mechanism:
         return other
 
     def merge(self, joints: Collection[int | None]) -> Mechanism:
-        """Return the mechanism without the indices `joints` in `separating_joints`."""
+        """Return a mechanism in which the fixed joints with the indices `joints` do not separate bodies."""
         fixed = {edge.joint for edge in self.edges if not self.joint(edge).kind.nv}
         if fixed.isdisjoint(joints):
             return self
         return Mechanism(self.tree, fixed - set(joints), self.labels, free_frames=self.free_frames)
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the joint order `names` gives the same motion.
+        """Return whether the robot moves in the same way with its joints in the order `names`.
 
         The result is false if the joints are not consecutive.
         """
@@ -398,7 +382,7 @@ class Mechanism:
                     yield [self.joint(edge).name, *others]
 
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
-        """Return whether an exchange of two joints keeps the motion.
+        """Return whether two joints can be exchanged without a change of the motion.
 
         | kinds | commute |
         |---|---|
@@ -473,10 +457,9 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) between two axes.
+    """Return the angle (rad) between two axes, and the distance (m) of `s.point` from the line t.
 
-    The distance is measured from `s.point` to the line t. Without `with_distance`, the distance is 0.
-    Opposite directions count as parallel.
+    Opposite directions count as parallel. Without `with_distance`, the distance is 0.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -504,7 +487,7 @@ class MatchedJoints:
         a: Index of A's joint.
         b: Index of B's joint.
         kind: "turns" (revolute), "prismatic", "planar" or "floating".
-        previous: Index of the previous joint pair on the path, or -1.
+        previous: Index of the previous joint pair on the path from the base, or -1.
         sense: Sign, 1 or -1.
         offset: Zero offset, rad or m.
         constant_motion: Rigid motion L (4, 4). B's joint moves the later bodies by L exp(S' t').
@@ -529,7 +512,8 @@ class MatchedJoints:
             "kind":  both joints move, and their kinds differ
             "kind":  one model reverses a planar or floating joint, and `conversion` is None
             "":      all other joints
-        conversion: Conversion between different coordinates of a planar or floating joint. Otherwise None.
+        conversion: Conversion of a planar or floating joint with different coordinates. None for all other
+            joints.
     """
 
     a: int
@@ -558,13 +542,13 @@ class FramePair:
     Attributes:
         a: Index of A's link.
         b: Index of B's link.
-        previous: Index of the last joint pair before the links, or -1.
+        previous: Index of the last joint pair on the path to the links, or -1.
         zero_pose: (4, 4) pose of A's link in the zero configuration.
-        constant_motion: Rigid motion L (4, 4) after the last joint. The module docstring defines L.
+        constant_motion: Rigid motion L (4, 4) after the last joint; the module docstring defines L.
         tilt: Angle between the frames, rad.
         shift: Distance between the origins, m.
-        tool: (4, 4) pose of B's link in the frame of A's link.
-            `tool` is the identity, except for different end-effector frames.
+        tool: (4, 4) pose of B's link in the frame of A's link, if the links are different end-effector
+            frames. Otherwise, the identity.
     """
 
     a: int
@@ -577,7 +561,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def move_difference_to_tool(self) -> FramePair:
-        """Return a copy in which `tool` contains the difference of the frames."""
+        """Return a copy in which `tool` contains the difference between A's frame and B's frame."""
         tool = inverse(self.zero_pose) @ self.constant_motion @ self.zero_pose
         return replace(self, constant_motion=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -591,12 +575,12 @@ class Alignment:
     """The result of aligning two mechanisms.
 
     Attributes:
-        base: Indices of the start links in A and B.
+        base: Indices of the links of A and B where the search started.
         X: (4, 4) pose of B's root in A's root frame.
         steps: Joint pairs, outwards from the base.
         bodies: Body of B by matched body of A.
         match_count: Number of joint pairs and link pairs that agree.
-        max_difference: Largest difference (m) in a joint pair or link pair.
+        max_difference: Largest difference (m) of a joint pair or link pair.
             The difference is `tilt * size_of(a, b) + shift`.
     """
 
@@ -620,7 +604,7 @@ class Alignment:
 
     @property
     def has_separated_names(self) -> bool:
-        """Whether two links with equal labels belong to different pairs of matched bodies."""
+        """Whether two links with equal labels are on matched bodies, but not on the same pair of bodies."""
         links_b = {label: link for link, label in enumerate(self.b.labels)}
         bodies = (
             (self.a.body_of[link], self.b.body_of[links_b[label]])
@@ -637,7 +621,7 @@ class Alignment:
 
     @property
     def has_free_frames(self) -> bool:
-        """Whether a convention chooses the link frames of A or B."""
+        """Whether a convention chooses the frames of A or B, as in a Denavit-Hartenberg table."""
         return self.a.free_frames or self.b.free_frames
 
     @property
@@ -659,7 +643,7 @@ class Alignment:
 
     @property
     def inner_difference_range(self) -> tuple[float, float]:
-        """Smallest and largest nonzero difference (m) in a joint pair or link pair.
+        """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
         A link pair is ignored if neither link has a child joint.
         """
@@ -688,9 +672,9 @@ class Alignment:
     def exchangeable_pairs(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield sets of two joint pairs that can exchange their partners.
 
-        The two pairs have the same kind and the same previous pair.
-        Each pair is on a path to a pair that differs.
-        A's joint names are not joint names of B or keys of `name_map`.
+        Both pairs have the same kind and the same previous pair.
+        Each pair is on the path from the base to a joint pair or link pair that differs.
+        In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -704,7 +688,7 @@ class Alignment:
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
         """Return a `FramePair` for each pair of link indices.
 
-        A pair is omitted if its bodies have no matched links.
+        A pair is omitted if no link of A's body is matched with a link of B's body.
         """
         matched_on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
@@ -712,7 +696,7 @@ class Alignment:
         for a, b in pairs:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # Two matched links determine the transform between the bodies.
+            # The transform from B's body to A's body follows from two matched links on these bodies.
             T_a_b = known.constant_motion @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
             zero_pose, end = self.a.zero_poses[a], IDENTITY
             tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
@@ -744,12 +728,13 @@ class AlignmentChoices:
     """Prescribed values for an alignment.
 
     Attributes:
-        base: Names of the start links in A and B. None: the search chooses the links.
+        base: Names of the links of A and B where the search starts. None: the search chooses the links.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
         conversions: Conversions of planar and floating joints, by A's joint name.
         orders: Each entry lists consecutive joints of B in their new order.
-        alone: Joints of A whose axes may differ without the later bodies. None: the search decides.
+        alone: Joints of A at which only the axis may differ, without a displacement of the later bodies.
+            None: the search decides.
     """
 
     base: tuple[str, str] | None = None
@@ -760,7 +745,7 @@ class AlignmentChoices:
     alone: Collection[str] | None = None
 
 
-#: `AS_WRITTEN` prescribes equal root poses and equal joint coordinates.
+#: `AS_WRITTEN` prescribes equal root poses and equal joint coordinates for A and B.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -787,21 +772,20 @@ class LinearFunction:
 class MatchedValues:
     """The values of two matched joints.
 
-    `a` and `b` use the positive direction and the zero of A's joint.
+    The functions `a` and `b` use the positive direction and the zero of A's joint.
     """
 
     a: LinearFunction
     b: LinearFunction
-    #: `sense * b + offset`: B's positive direction and zero apply.
+    #: The value `sense * b + offset`, which uses the positive direction and the zero of B's joint.
     b_unconverted: LinearFunction
-    #: Rounding error that was removed from `b`: `max(0, D - E)`, rad or m.
-    #: D is the difference of the computed constants.
-    #: E is the rounding error of one joint.
+    #: Rounding error that was removed when `b` was set equal to `a`: max(0, D - E), rad or m. D is the
+    #: difference of the computed constants, and E is the rounding error of one joint.
     rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
-        """The joints' common variable; None if the joints have different variables."""
+        """The variable that moves the joints; None if different variables move the two joints."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -812,8 +796,8 @@ class Variables:
     """The values of all matched joints.
 
     Attributes:
-        pairs: The values of each joint pair.
-            None for planar joints, floating joints, and moving joints of different kinds.
+        pairs: The values of each joint pair. None for planar and floating joints, and for moving
+            joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
         rule_differences: Indices of the joint pairs with different mimic rules.
         coordinates_b: Functions that compute B's coordinates from the variables, by joint name.
@@ -831,7 +815,7 @@ class Variables:
         return ends[0], ends[1]
 
     def value_difference(self, pair: MatchedValues) -> float:
-        """Return the largest difference of the joint values (rad or m)."""
+        """Return the largest difference (rad or m) of the joint's values in A and B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
                 LinearFunction(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
@@ -913,7 +897,7 @@ class _VariablesBuilder:
         """Return whether two functions differ by rounding only.
 
         Let e be the rounding error of one joint. The slopes may differ by e. The constants may differ by
-        `depth * e`. Poses of several joints determine a zero offset.
+        `depth * e`, because the poses of several joints determine a zero offset.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)
@@ -925,8 +909,9 @@ class _VariablesBuilder:
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """Intersect the limits of all joints that a variable moves.
 
-        If the intersection is empty or one value, the range is A's limits.
-        The limits of mimic joints are ignored. Mimic joints follow their rules beyond these limits.
+        If the intersection is empty or a single value, the range is the limits in A.
+        If the variable moves no joint of A, the range is then the limits in B.
+        The limits of mimic joints are ignored, because mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

@@ -1,14 +1,8 @@
-"""Prove upper bounds on the distance between a frame's poses in two models.
+"""Prove upper bounds on the distance between a frame's poses in two models, for all configurations.
 
-The bounds hold for all configurations.
-
-Support functions:
-
-Let W be a set of points. The support function of W is:
-
-`h(u) = max of u . p over all points p in W`.
-
-For unit vectors u, the maximum of h(u) is the largest |p|. A motion of W changes h to h':
+**Support functions.** The support function h(u) of a set W of points is the maximum of u . p over all points
+p in W. The largest distance of W from the origin is the maximum of h(u) over all unit vectors u. A motion of
+W changes h to h':
 
 | motion of W | h'(u) |
 |---|---|
@@ -16,34 +10,30 @@ For unit vectors u, the maximum of h(u) is the largest |p|. A motion of W change
 | all rotations R of a range | the maximum of `h(R^T u)` |
 | all translations p of a range | `h(u)` plus the maximum of `u . p` |
 
-The program computes h joint by joint along the chain. The computation needs no search over joint values.
+urdfkin computes h joint by joint along the chain, without a search over joint values.
 
-The program stores h(u) at grid points on the surface of a cube. The function h is convex. For s >= 0, h(s u)
-is s h(u). Therefore, interpolation between grid points gives an upper bound. If R covers a joint's range, the
-vectors R^T u form an arc. The program encloses the arc in a polygon. A convex function is largest
-at a corner of a polygon. At each joint, the interpolated h can be larger than the true h. The relative error
-is proportional to the square of the grid spacing.
+urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
+s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For all rotations R in the range
+of a joint, the vectors R^T u form an arc. urdfkin encloses the arc in a polygon, because a convex function on
+a polygon is largest at a corner. At each joint, the interpolated h can be larger than the true h. The
+relative error is proportional to the square of the grid spacing.
 
-Recursion:
+**Recursion.** Suppose that only the joints after joint i move. A's frame is then at x, and B's frame at y.
+Let d = y - x. Joint i moves A's frame by e(S t), and B's frame by L e(S' t') with the constant rigid motion
+L. If joint i moves too, d becomes:
 
-Suppose that only the joints after joint i move. A's frame is then at x, and B's frame at y. Let d = y - x.
-A's joint i moves the frame by e(S t). B's joint i moves the frame by L e(S' t'). L is a constant rigid
-motion. If joint i moves too, d becomes:
+`d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d`
 
-`d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d`.
+If A and B agree at joint i, the first three terms are 0. The sum of the terms' support functions is an upper
+bound. The terms' support functions follow from the support functions of y and d. If A and B differ at several
+joints, the terms of these joints may be largest in different configurations. The sum can then exceed the true
+maximum.
 
-If A and B agree at joint i, the first three terms vanish. The sum of the terms' support functions is an upper
-bound. The terms' support functions follow from the support functions of y and d. A and B may differ at
-several joints. The terms of these joints may be largest in different configurations. The sum can then exceed
-the true maximum.
+A second bound is the sum of upper bounds on the displacements by all motions L. This sum is valid only if all
+matched joints have equal axes and equal values. The result is the smaller of the two bounds.
 
-A second bound is the sum of displacement bounds for all motions L. The second bound requires equal axes and
-equal values of all matched joints. The result is the smaller of the two bounds.
-
-Second derivatives:
-
-Let D = p_B - p_A be the difference of the frame's positions. `curvature_bounds` computes bounds on the second
-derivatives of D. The computation goes joint by joint from the frame to the base. Joint i has these
+**Second derivatives.** Let D = p_B - p_A be the difference of the frame's positions. `curvature_bounds`
+computes bounds on the second derivatives of D, joint by joint from the frame to the base. Joint i has these
 quantities:
 
 | quantity | in A | in B |
@@ -53,14 +43,14 @@ quantities:
 | point on the axis | o | o' |
 | value | t | t' |
 
-For a rotating vector r, dr/dt = u x r. Let Y = e(S' t') y. The derivatives of y and d with respect to joint
-i's value are:
+The derivative of a rotating vector r with respect to the angle is u x r. Let Y = e(S' t') y. The derivatives
+of y and d with respect to the value of joint i are:
 
 `y_i = u' x (Y - o')`
-`d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')`.
+`d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')`
 
-The derivatives y_i and d_i are free vectors. The joints between the base and joint i only rotate free
-vectors.
+The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i rotate these
+vectors, but do not translate them.
 """
 
 from __future__ import annotations
@@ -169,10 +159,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return an upper bound on h for a range of rotations.
-
-        The angle about `screw` is between `low` and `high` (rad).
-        """
+        """Return an upper bound on h over all rotations about `screw` from `low` to `high` (rad)."""
         angles, factors = np.array(_polygon_around_arc(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -180,13 +167,13 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return h of the rotated points for each angle.
+        """Return h after a rotation of the points, for each angle.
 
         The axis of the rotation contains the origin. The value at a grid point is:
 
-        `h(along + factor R^T across)`.
+        `h(along + factor R^T across)`
 
-        The vector `along` is the grid point's part parallel to the axis. `across` is the perpendicular part.
+        The vectors `along` and `across` are the grid point's parts parallel and perpendicular to the axis.
 
         Args:
             axis: Unit vector.
@@ -198,15 +185,12 @@ class Support:
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
-        R = rotation_about(axis, angles)  # r^T R = (R^T r)^T
+        R = rotation_about(axis, angles)  # a row vector times R equals R^T times the column vector
         across = (G - along) @ R * np.reshape(factors, (-1, 1, 1))
         return self.evaluate(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the maximum of h for a range of translations.
-
-        The translation along `direction` is between `low` and `high` (m).
-        """
+        """Return the maximum of h over all translations along `direction` from `low` to `high` (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -223,10 +207,10 @@ class Support:
         return float(max((self.evaluate(u) - u @ screw.point).max(), 0.0))
 
     def max_distance(self) -> float:
-        """Return an upper bound (m) on the points' distance from the origin.
+        """Return an upper bound (m) on the distance of the points from the origin.
 
-        The corners of a grid cell are g_k. Let r be the largest angle between a corner and the cell's centre.
-        In the cell, `u = sum of c_k g_k` with c_k >= 0. Therefore:
+        Let r be the largest angle between the centre of a grid cell and the cell's corners g_k. A direction u
+        in the cell is the sum of c_k g_k with c_k >= 0. Therefore:
 
         `h(u) <= sum of c_k h(g_k)`
         `|u| >= cos r * (sum of c_k |g_k|)`
@@ -246,7 +230,7 @@ def point_support(grid: Grid, p: FloatArray) -> Support:
 
 
 def _polygon_around_arc(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Return each corner's angle (rad) and distance from the unit circle's centre."""
+    """Return each corner's angle (rad) and distance from the centre of the unit circle."""
     if high - low >= _FULL_TURN:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
@@ -260,21 +244,22 @@ def _polygon_around_arc(low: float, high: float, segments: int) -> list[tuple[fl
 
 #: `FINE_GRID` gives smaller bounds than `COARSE_GRID`, but takes longer.
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
-#: Maximum number of sampling intervals of a revolute joint's variable.
-#: In longer ranges, A's and B's angles count as independent.
+#: Maximum number of intervals between the samples of a revolute joint's variable. If a range needs more
+#: intervals, the joint's angles in A and B are treated as independent.
 MAX_SAMPLE_INTERVALS = 1024
 
 
 def upper_bounds(
     alignment: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE_GRID
 ) -> tuple[float, float]:
-    """Return upper bounds on a frame's pose difference between A and B.
+    """Return upper bounds on the difference of a frame's poses in A and B.
 
     The bounds hold for all joint values within the limits.
 
     Returns:
         Bounds on the distance (m) and on the angle (rad). The bounds are 0 if nothing on the frame's path
-        differs. Without a proof, a bound is inf. An example is a pair of moving joints of different kinds.
+        differs. A bound is inf if no bound is proven, for example if moving joints of different kinds are
+        matched.
     """
     steps, pairs = joints_from_first_difference(alignment, variables, frame)
     if not steps and frame.constant_motion is IDENTITY:
@@ -295,10 +280,7 @@ def upper_bounds(
 def joints_from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the joint pairs on a frame's path, and their values.
-
-    The result starts at the first joint pair that differs.
-    """
+    """Return the joint pairs on a frame's path from the first difference on, and their values."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -315,16 +297,15 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Return the sum of each difference's largest angle (rad)."""
+    """Return the sum of the largest angles (rad) that the differences between A and B can cause."""
     total = pose_difference(IDENTITY, frame.constant_motion)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.constant_motion)[0]
         if step.kind != "turns" or pair is None:
             continue
         if step.axis_b is not step.axis_a:
-            # R rotates by the joint angle t. Q rotates by the tilt s.
-            # The rotation Q R Q^T R^T has the angle r.
-            # sin(r/4) = sin(s/2) sin(t/2)
+            # Let R be the joint's rotation by t, and Q the rotation by the tilt s between the axes. The
+            # rotation Q R Q^T R^T has an angle r with sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
         if pair.a != pair.b:
@@ -371,9 +352,9 @@ def supports_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the supports of d and y after a joint's motion and L."""
-    # Planar and floating joints can rotate d by any angle.
-    # Therefore, the new bound is h(u) = |u| max |d|.
+    """Return the support functions of d and y after a joint's motion and L."""
+    # A planar or floating joint can rotate d by any angle. Therefore, the new upper bound on the support
+    # function of d is h(u) = |u| max |d|.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -399,7 +380,7 @@ def supports_after_constant_motion(step: MatchedJoints, d: Support, y: Support) 
 def d_support_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Return the support of d after a joint's motion, without L."""
+    """Return the support function of d after a joint's motion, without the motion L."""
     same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis_a.direction, np.zeros(3))
@@ -415,9 +396,9 @@ def d_support_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support of t' u' - t u for two prismatic joints.
+    """Return the support function of t' u' - t u for two matched prismatic joints.
 
-    The difference is linear in the joint values. Therefore, the difference is largest at limits.
+    The difference is linear in the joint values, so its support function is largest at the limits.
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
@@ -434,9 +415,10 @@ def _prismatic_difference(
 
 
 def _variable_samples(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return samples (n,) of two revolute joints' common variable, or None.
+    """Return samples (n,) of the common variable of two revolute joints, or None.
 
-    One turn covers an infinite range for slopes 0, 1 or -1. Other infinite ranges give None.
+    If the range is infinite, one turn covers the range only for the slopes 0, 1 and -1. The result is None
+    for other slopes, for joints with different variables, and for more than `MAX_SAMPLE_INTERVALS` intervals.
     """
     if (name := pair.variable) is None:
         return None
@@ -453,25 +435,26 @@ def _variable_samples(pair: MatchedValues, variables: Variables, grid: Grid) -> 
 def _common_variable_difference(
     step: MatchedJoints, pair: MatchedValues, samples: FloatArray, y: Support, d: Support
 ) -> Support:
-    """Return the support of d after two revolute joints with a common variable.
+    """Return the support function of d after two matched revolute joints with a common variable.
 
-    Let b_0 and b_1 be the bounds at two neighbouring samples. Let h be the distance of the samples. Let M be
-    a bound on the length of the second derivative. Between the samples, the bound is:
+    Let b_0 and b_1 be the bounds at two neighbouring samples of the variable, and h the distance of the
+    samples. Let M be a bound on the length of the second derivative. Between the samples, the bound is:
 
-    `max(b_0, b_1) + M h^2 / 8`.
+    `max(b_0, b_1) + M h^2 / 8`
 
     If t' = t + c, the second derivative is:
 
-    `d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'`.
+    `d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'`
 
-    In A, x is the vector from the axis u to y. P projects perpendicular to u, and R rotates about u. The
-    symbols of B have a prime. Perpendicular to the axis, x' - x is the axis offset. The matrices satisfy:
+    In A, x is the vector from the axis u to y, P projects perpendicular to u, and R rotates about u. In B,
+    the symbols have a prime. The component of x' - x perpendicular to the axis is the offset of the axes. The
+    matrices satisfy:
 
     `|R' - R| <= 2 |u' - u| + |c|`
-    `|P' - P| <= |u' - u|`.
+    `|P' - P| <= |u' - u|`
 
-    Otherwise, let m and m' be the slopes of t and t'. Let r and r' be the largest distances of y from the
-    axes. Then `M = m^2 r + m'^2 r'`.
+    If t and t' have different slopes m and m', then M = m^2 r + m'^2 r'. Here r and r' are the largest
+    distances of y from the axes.
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b
@@ -503,11 +486,11 @@ def _common_variable_difference(
 def _independent_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support
 ) -> Support:
-    """Return the support of e(S' t') y - e(S t) y.
+    """Return the support function of e(S' t') y - e(S t) y for independent angles t and t'.
 
-    The angles t and t' are independent. For different axes, the supports of the two terms are added. For
-    equal axes, the length is at most `2 r sin(a/2)`. Here r is the largest distance of y from the axis. The
-    angle a is `min(pi, max of |t' - t|)`.
+    If the axes are different, the result is the sum of the support functions of e(S' t') y and -e(S t) y. If
+    the axes are equal, the length of the vector is at most 2 r sin(a/2). Here r is the largest distance of y
+    from the axis, and a is the smaller of pi and the largest |t' - t|.
     """
     G, u = y.grid.points, step.axis_a.direction
     if step.axis_b is not step.axis_a:
@@ -528,7 +511,7 @@ _SupportPair = tuple[Support, Support]
 def curvature_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return upper bounds on the lengths of the second derivatives of D.
+    """Return upper bounds on the lengths of the second derivatives of D for each pair of variables.
 
     D = p_B - p_A is the difference of the frame's positions. All bounds are inf if paired joints
     have different variables or slopes. Pairs without effect on D are ignored.
@@ -543,7 +526,7 @@ def curvature_bounds(
         if not all(one.a.slope or one.b.slope for one in both):
             continue
         alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # For prismatic joints, `bound` can be 0 despite different values.
+        # For a prismatic joint i, `bound` can be 0 although the joint values in A and B differ.
         if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
             return names, np.full_like(M, math.inf)
         if not bound:
@@ -559,10 +542,7 @@ def curvature_bounds(
 def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield joints i >= j, and a bound on D's second derivative.
-
-    The derivative is with respect to the values of joints i and j.
-    """
+    """Yield joints i and j <= i, and a bound on the second derivative of D with respect to their values."""
     free = [_as_free_vectors(step) for step in steps]
     d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
@@ -610,7 +590,7 @@ def _length_bound_at_base(
 def _derivative_supports(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _SupportPair:
-    """Return supports of the derivatives of d and y, without L.
+    """Return bounds on the support functions of the derivatives of d and y, without the motion L.
 
     The derivatives are with respect to the joint's value.
     """
@@ -641,10 +621,7 @@ def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _Sup
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Remove the translations of a matched joint.
-
-    A translation does not change a free vector.
-    """
+    """Remove the translations of a matched joint, because a translation does not change a free vector."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
@@ -654,10 +631,10 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 def relevant_joints(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints that affect |D|, and their values.
+    """Return the matched joints that affect the length of D, and the values of these joints.
 
-    The result begins at the first joint that differs. An earlier joint can have the same variable as one of
-    these joints. The result then begins at the earlier joint.
+    The result begins at the first joint that differs. If an earlier joint has the same variable as one of
+    these joints, the result begins at the earlier joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),
