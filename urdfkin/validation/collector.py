@@ -1,7 +1,7 @@
-"""Collect the answers of a run, report the progress, and make robots' reports.
+"""Collect the answers of a run, report the progress, and make the report of each robot.
 
-The results of consecutive chunks are stored as one sum, to save memory. The sum does not depend on the order
-of the results.
+The results of consecutive chunks are stored as one sum, to save memory. The error statistics in the sum do
+not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -152,8 +152,8 @@ class _RobotAnswers:
         return self.chunks_done == len(self.chunks)
 
     def make_report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # A report contains only chunks before the first failed chunk.
-        # Results of later chunks would depend on the workers' speed.
+        # The report contains only results of chunks before the first failed chunk. Otherwise, the report
+        # would depend on the speed of the workers.
         last = min(self.failures, default=self.chunks.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]
