@@ -120,7 +120,7 @@ HISTORY = DocumentKind(
 )
 
 #: Changes between runs, as pairs (index of the run, change), by the source of the changed robot. The key None
-#: is for changes of a whole run, for example of its number of samples.
+#: is for changes of a whole run, for example a change of the number of samples.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -218,7 +218,7 @@ def _reports_in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _reports_in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
-    """Yield reports by start time. Add unusable files and repeated runs to `history`."""
+    """Yield reports by start time, and add unusable files and repeated runs to `history`."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -246,7 +246,7 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _read_start_time(path: Path) -> tuple[float, str]:
-    """Return a report's start time as Unix time (s), and as text. If invalid, the Unix time is infinite."""
+    """Return a report's start time as Unix time in seconds, and as text; an invalid text gives infinity."""
     data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MAX_BYTES), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     moment = utc(text)

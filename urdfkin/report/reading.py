@@ -33,12 +33,11 @@ from urdfkin.validation.error_stats import histogram_bin, percentile
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
-#: nq and nv of each kind of joint.
+#: Number of coordinates (nq) and of joint velocities (nv) of each kind of joint.
 _COORDINATE_COUNTS = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(
     _WITH_AXIS, (1, 1)
 )
-#: Tolerance of rotation matrices and unit axes.
-#: A robot file may have only 6 digits.
+#: Tolerance of rotation matrices and unit axes. It is large, because a robot file may have only 6 digits.
 _ROTATION_TOLERANCE = 1e-5
 
 

@@ -366,9 +366,8 @@ class Mistakes:
                     order[[at[1], to[1]]] = order[[to[1], at[1]]]
                 try:
                     predicted = self._compute_with_order(case, first_inputs, order)
-                # In some conventions, a mimic joint has a coordinate, and the exchange gives it a wrong
-                # value.
                 except UrdfkinError:
+                    # In some conventions, a mimic joint has a coordinate, which the exchange makes wrong.
                     continue
                 if case.remainder(predicted, _FIRST_SAMPLES) <= EXPLANATION_TOLERANCE:
                     exchanged = self._exchange_joints(case.inputs, tuple(at), tuple(to))

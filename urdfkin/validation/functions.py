@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.call import Call
 
 _BATCH_SIZE = 256
-#: More samples do not fit in memory.
+#: Maximum number of random configurations, because more do not fit in memory.
 _MAX_SAMPLES = 10**9
 _DIAGNOSIS_SAMPLES = 48
 _MAX_MESSAGES = 5

@@ -103,8 +103,7 @@ def _find_group_free_bytes(mount: Path, group: str, limit: str, usage: str) -> I
         numbers = [line for file in (limit, usage) for line in _read_lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _read_lines(place / "memory.stat"))
-            # Linux counts cached files as used memory.
-            # Linux frees the memory of inactive cached files on demand.
+            # Linux counts cached files as used memory, but frees inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 

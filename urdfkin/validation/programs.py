@@ -47,7 +47,7 @@ _MAX_ANSWER_BYTES = 64 * 2**20
 _MAX_ERROR_LENGTH = 300
 #: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
-#: One day, s.
+#: Maximum time limit for an answer: one day, in seconds.
 _MAX_TIMEOUT = 86400.0
 
 

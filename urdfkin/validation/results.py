@@ -40,7 +40,7 @@ LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Return library versions, and digests of the equations and of the code without `_DISPLAY_PACKAGES`."""
+    """Return library versions, and digests of the equations and of the code that can affect results."""
     equations = hashlib.sha256(read_bytes(_PACKAGE_FOLDER / "kinematics" / "equations.py")).hexdigest()
     return {name: package_version(name) for name in LIBRARIES} | {
         "code": _digest_code(),

@@ -10,9 +10,9 @@
     DIR/.writing/                  unfinished files
     DIR/damaged/                   damaged and unknown files
 
-The manifest defines the robots, the samples, the versions, the chunks and the key of each chunk. The key is
-the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts or options
-are never reused.
+The manifest defines the robots, the samples, the seed, the versions, the chunks and the key of each chunk.
+The key is the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts
+or options are never reused.
 
 Files are written atomically, so a file is either complete or absent. A file's name contains the key of its
 chunk. The store reports damaged files, and files that belong to no chunk of the validation. A writable store
