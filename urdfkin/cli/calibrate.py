@@ -254,7 +254,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _check_suffix(output: Path | None, *, is_table: bool) -> None:
-    """A file with a wrong suffix could not be read again."""
+    """Raise InputError for a wrong suffix, because the written file could not be read again."""
     suffix = "" if output is None else output.suffix.lower()
     if is_table and suffix not in ("", ".toml"):
         raise InputError("--output writes a table as TOML", where=str(output), remedy="use the suffix .toml")

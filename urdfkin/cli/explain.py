@@ -32,9 +32,9 @@ def answers() -> dict[str, str]:
 
 
 def find_answer(topic: str) -> str | None:
-    """Return a section of docs/questions.md, or None.
+    """Return the section of docs/questions.md that `topic` names, or None.
 
-    The section has the anchor `topic`. Otherwise, its anchor is the only one with all words of `topic`.
+    `topic` is the anchor of the section, or consists of words that only the anchor of this section has.
     """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]

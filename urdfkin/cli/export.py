@@ -1,6 +1,7 @@
 """Write files for other programs.
 
-`urdfkin export`: a frame's kinematics as code, with test vectors. `urdfkin vectors`: test vectors alone.
+`urdfkin export` writes a frame's kinematics as code, with test vectors. `urdfkin vectors` writes test vectors
+alone.
 """
 
 from __future__ import annotations

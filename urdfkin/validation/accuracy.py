@@ -184,7 +184,7 @@ class _AccuracyBatch:
         )
 
     def _compute_analytical_samples(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """Omit Euler angles near a singularity, and quaternions with an uncertain sign."""
+        """Yield samples without Euler angles near a singularity and quaternions with an uncertain sign."""
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, part = self.part.plan, self.part
         magnitudes, min_distance = (

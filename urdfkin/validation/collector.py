@@ -31,7 +31,7 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
-        label: Name of the robot of the latest chunk. Before the first chunk: name of the first robot.
+        label: Name of the robot of the latest chunk; before the first chunk, the name of the first robot.
     """
 
     robots_done: int
@@ -188,7 +188,7 @@ def _decide_verdict(
     samples: int,
     requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
-    """A disagreement takes precedence over a failure."""
+    """Return the verdict and its reasons; a disagreement takes precedence over a failure."""
     disagreements = list(_describe_disagreements(error_stats, summary))
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:

@@ -356,10 +356,10 @@ class _FunctionResults:
         first: Index of the batch's first configuration in the whole check.
         inputs: Inputs of the whole batch, in the function's convention.
         valid_indices: (n,) indices in the batch.
-        actual: (n, ...), from the user's function.
-        expected: (n, ...), from urdfkin.
-        scale: (n, ...). The allowed difference is k * eps * scale.
-        k: (n,), `FunctionCheck.factor` included.
+        actual: (n, ...) results of the user's function.
+        expected: (n, ...) results of urdfkin.
+        scale: (n, ...) scales of the results. The allowed difference is k * eps * scale.
+        k: (n,) factors of the bounds, multiplied by `FunctionCheck.factor`.
     """
 
     first: int

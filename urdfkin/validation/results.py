@@ -170,7 +170,7 @@ class ValidationReport(Displayable):
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        library_versions: Package versions of the run. None: the installed versions.
+        library_versions: Package versions of the run; None for the installed versions.
         studies: Results of the accuracy study, one for each compared robot. Empty if no study was requested.
             The result of a robot is None if its study failed or is missing.
     """

@@ -83,7 +83,8 @@ def _describe_joint(robot: Robot, i: int, reductions: dict[str, RangeReduction])
 def _remaining_range(reduction: RangeReduction | None) -> dict[str, Any] | None:
     """Return the range of a mimicked joint within the limits of its mimic joints.
 
-    None: the joint's whole range. The ends are None if the limits allow at most one value.
+    The result is None if the joint keeps its whole range. The ends are None if the limits allow at most one
+    value.
     """
     if reduction is None:
         return None

@@ -162,7 +162,7 @@ class Store:
     """A folder that contains the results of a validation.
 
     Attributes:
-        scratch: Folder for unfinished files; None: the store is read-only.
+        scratch: Folder for unfinished files; None if the store is read-only.
     """
 
     folder: Path
@@ -433,7 +433,7 @@ def _hold_lock(folder: Path, shard: str | None) -> Iterator[None]:
 
 
 def _open_lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """Refuse links, pipes and devices."""
+    """Open a lock file; raise SourceError for a link, a pipe or a device."""
     message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -487,7 +487,7 @@ class FailedStudy:
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study. `moving_base`: the root link has a random motion in each sample."""
+    """Settings of the accuracy study; with `moving_base`, the root link moves at random in each sample."""
 
     samples: int
     seed: int
