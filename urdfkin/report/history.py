@@ -1,7 +1,7 @@
 """History of robots in several validation reports: verdicts, results, findings and changes from run to run.
 
 Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed.
-Each report is read twice, first for the start time and then for the results, so that few reports are in
+Each report is read twice, first for its start time and then for its results. Therefore, few reports are in
 memory at the same time.
 """
 
