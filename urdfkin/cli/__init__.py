@@ -1,6 +1,6 @@
-"""Command-line interface. Only a running command imports its module.
+"""Command-line interface; the module of a command is imported only when the command is used.
 
-The summaries of commands are in this module or in `verify/quantities.py`. `urdfkin --help` therefore needs
+The summaries of commands are in this module or in `verify/quantities.py`, so that `urdfkin --help` needs
 neither NumPy nor Pinocchio.
 """
 
@@ -24,10 +24,9 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Maps a heading of the help page to its commands.
-#: Maps a command to a module and a summary.
-#: The function `NAME_command` of the module is the command.
-#: `make_command` makes the commands of quantities.
+#: Maps each heading of the help page to the commands below it. Each command has a module in `urdfkin.cli` and
+#: a summary. The command is the function `NAME_command` of its module; `make_command` makes the commands of
+#: quantities.
 _COMPUTE_HEADING = "Compute"
 _COMMANDS_BY_HEADING: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -171,7 +170,7 @@ def _unknown_command(name: str) -> UrdfkinError:
 
 
 class LazyGroup(click.Group):
-    """A command group that imports a command's module only when the command runs."""
+    """A command group that imports the module of a command only when the command is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(commands())
@@ -219,7 +218,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version
 
     click.echo(f"urdfkin {urdfkin_version()}, Pinocchio {version()}")
-    # Without Pinocchio, this call raises an error.
+    # If Pinocchio is not installed, this call raises an error.
     pinocchio()
     ctx.exit()
 
@@ -239,8 +238,8 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. `urdfkin COMMAND --help` shows the
-    options of a command, and an example.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
+    shows the options of a command, and an example.
     """
 
 
@@ -253,6 +252,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The last line of the output already contains "not verified".
+    # The warning "not verified" is hidden, because the last line of the output says the same.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

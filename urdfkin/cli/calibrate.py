@@ -1,4 +1,4 @@
-"""`urdfkin calibrate`: fit parameters to measured poses, and write the calibrated file."""
+"""`urdfkin calibrate`: fit a robot's parameters to measured poses, and write the calibrated file."""
 
 from __future__ import annotations
 
@@ -111,17 +111,18 @@ def calibrate_command(
 ) -> None:
     """Fit the parameters of ROBOT to measured poses, and write a calibrated file.
 
-    The new URDF differs from that of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at the
-    measured configurations. With --ur, Pinocchio uses random configurations.
+    The new URDF differs from the URDF of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at
+    the measured configurations, or with --ur at random configurations.
 
-    If ROBOT is a Denavit-Hartenberg table, the command fits the table's numbers. Pinocchio checks the new
-    table in the zero configuration.
+    If ROBOT is the file of a Denavit-Hartenberg table, the command fits the numbers of the table. Pinocchio
+    checks the new table in the zero configuration.
 
     Without --poses and --ur, the command lists the parameters that are identifiable in principle.
 
-    The command refuses an implausible calibration, and prints the likeliest cause. Possible causes are angles
-    in degrees, wrong joint signs, or joint values of other poses. With --force, the command writes the
-    calibration nevertheless. If the joint values look like degrees, --radians is also needed.
+    The command refuses a calibration that is not plausible, and prints the likeliest cause. Possible causes
+    are joint angles in degrees, a joint with the wrong sign, or joint values that belong to another pose.
+    With --force, the command writes the calibration nevertheless. If the joint values look like degrees,
+    --radians is also needed.
 
     Exit 0: verified, or only a list of parameters. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or
     refused.
@@ -150,8 +151,8 @@ def calibrate_command(
 
     def write_answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # `Answer` adds the keys `verified` and `check` to a mapping.
-        # `Answer` does not change a text.
+        # The JSON is passed to `Answer` as text, because `Answer` would add the keys `verified` and `check`
+        # to a mapping.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMATS)
         context.exit(code)
 
@@ -211,7 +212,8 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     source = table if isinstance(table, DHTable) else robot
     _check_suffix(options["output"], is_table=source is not robot)
     if source is not robot:
-        # The fit uses the table, so robot options are rejected.
+        # The fit uses the table itself, not the robot made from it, so options that change the robot are
+        # rejected.
         unused = "mimic", "root_joint", "lock", "joints", "convention"
         reject_unused_options(context, unused, "for a table")
     path = robot.chain(tip, base)
@@ -220,8 +222,8 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     coordinates, neutral = (robot.coordinate_names, robot.neutral()) if source is robot else (names, None)
     if conversion is not None:
         coordinates, neutral = conversion.coordinate_names, conversion.to(robot.neutral())
-        # Some conventions have a coordinate for each mimic joint.
-        # This coordinate must follow the mimicked joint.
+        # In some conventions, a mimic joint has its own coordinate, which must agree with the mimicked
+        # joint's coordinate.
         mimics = [j.name for j in robot.tree.joints if j.mimic and j.mimic.mimicked_joint in names]
         indices = conversion.q_and_v_indices
         names = [coordinates[i] for name in (*names, *mimics) if name in indices for i in indices[name][0]]
@@ -234,7 +236,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        # `load` has already shown these warnings.
+        # These warnings were already shown when the robot was loaded.
         warnings.simplefilter("ignore")
         return fit_model(
             source,
@@ -252,7 +254,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _check_suffix(output: Path | None, *, is_table: bool) -> None:
-    """A file with a wrong suffix could not be read again."""
+    """Raise InputError for a wrong suffix, because the written file could not be read again."""
     suffix = "" if output is None else output.suffix.lower()
     if is_table and suffix not in ("", ".toml"):
         raise InputError("--output writes a table as TOML", where=str(output), remedy="use the suffix .toml")

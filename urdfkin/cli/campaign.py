@@ -36,7 +36,7 @@ _JSON_INTERVAL = 0.5
 
 
 class SpeedEstimator:
-    """Estimates a validation's speed (chunks per second) and remaining time (s).
+    """Estimates the speed of a validation in chunks per second, and the remaining time in seconds.
 
     A chunk is a part of the samples of one robot.
     """
@@ -46,8 +46,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # The measured time excludes the compilation of kernels.
-        # Each call before the first new chunk restarts the clock.
+        # Each call before the first new chunk restarts the clock, because urdfkin may compile kernels first.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:
@@ -156,7 +155,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
 
 _MAX_FAILED = 20
-#: Maximum number of chunks that `_seconds_per_chunk` reads.
+#: Maximum number of finished chunks from which `status` estimates the computing time of one chunk.
 _MAX_TIMED_CHUNKS = 200
 
 
@@ -170,11 +169,10 @@ _MAX_TIMED_CHUNKS = 200
 def status(context: click.Context, folder: Path) -> None:
     """Show the finished and failed robots, and an estimate of the remaining time.
 
-    DIR is the folder of `urdfkin validate --store DIR`. The command reads only a few files of the folder. The
-    command is therefore fast and does not disturb a running validation. `urdfkin report DIR` reads and checks
-    all files.
+    DIR is the folder of `urdfkin validate --store DIR`. The command reads only a few files of the folder, so
+    it is fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all files.
 
-    Exit 0: complete. 3: results (also of the accuracy study) are missing, or a robot failed.
+    Exit 0: complete. 3: results of the validation or of its accuracy study are missing, or a robot failed.
     """
     from urdfkin.validation.store import Store
 
@@ -214,7 +212,7 @@ def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
-    """Print the progress of the accuracy study; return the number of missing results."""
+    """Print the progress of the accuracy study, and return the number of missing results."""
     from urdfkin.validation.store import AccuracyStore
 
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
@@ -253,11 +251,11 @@ def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> flo
 @click.argument("folder", metavar="DIR", type=FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Copy a validation's results from several stores into the folder DIR.
+    """Copy the results of several stores of the same validation into the folder DIR.
 
-    Each STORE is a folder that `urdfkin validate --store` wrote. The folders can come from several machines.
-    Results of the accuracy study are copied too. Each file is read and checked; damaged files are reported
-    and skipped. DIR is made if it does not exist.
+    Each STORE is a folder that `urdfkin validate --store` wrote, for example on another machine. Results of
+    the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
+    DIR is made if it does not exist.
     """
     from urdfkin.validation.store import AccuracyStore, Store, open_store
 

@@ -63,16 +63,17 @@ class CheckOutcome:
     """The results of all files.
 
     Attributes:
-        silenced_findings: Findings that a comment suppresses, each with the comment's reason.
-        excerpts: For each finding, the faulty line and a line of carets. None: the finding marks no text.
+        silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
+            comment.
+        excerpts: For each finding, the faulty line and a line with carets; None if the finding marks no text.
         known_count: Number of findings that the baseline file suppresses.
-        obsolete_count: Number of findings that only the baseline file still contains.
+        obsolete_count: Number of findings in the baseline file that the checked files no longer have.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
-        files_with_errors: Files with a reported error. The option --fix does not change these files. A
-            warning that --strict reports as an error does not count.
+        files_with_errors: Files with a reported finding of severity error. The option --fix does not change
+            these files. A warning that --strict reports as an error does not count.
         files_with_mark: Files that begin with a byte order mark.
-        unwritable: Names of inputs that --fix cannot change. Such inputs are standard input, pipes, expanded
-            .xacro files and robots of the catalogue.
+        unwritable: Names of inputs that --fix cannot change: standard input, a pipe, an expanded .xacro file,
+            or a robot of the catalogue.
     """
 
     files: list[str] = field(default_factory=list)
@@ -169,7 +170,7 @@ def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS_KEY = "urdfkin.settings"
-#: Settings in pyproject.toml that replace defaults.
+#: Settings in pyproject.toml that replace the defaults of the options with the same names.
 _OPTION_SETTINGS = ("select", "ignore", "exclude", "strict", "notes")
 
 
@@ -291,17 +292,17 @@ size_limit_options = combine(
 @size_limit_options
 @click.pass_context
 def check_command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
-    """Check URDF files and print all findings, with code, line, cause and remedy.
+    """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
-    A FILE is the path of a URDF, USD or MJCF file. FILE can also be a name from `urdfkin robots`, or - for
-    standard input. In a FOLDER and its subfolders, the command checks all *.urdf files. Hidden subfolders are
-    skipped. Without FILE and FOLDER, the current folder is checked.
+    A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard
+    input. For a FOLDER, the command checks the *.urdf files in the folder and its subfolders, except hidden
+    subfolders. Without FILE and FOLDER, the current folder is checked.
 
-    A .xacro file is expanded in a restricted process. This process can only compute, and read certain folders
-    (docs/xacro.md). One of these folders is the file's package.
+    A .xacro file is expanded in a restricted process. The process can only compute, and read files in certain
+    folders such as the .xacro file's package (docs/xacro.md).
 
-    The option --changed-since origin/main reports the new findings of a pull request. Settings are in the
-    table [tool.urdfkin] of pyproject.toml (docs/check.md).
+    With --changed-since origin/main, the command reports only the new findings of a pull request. Settings
+    are in the table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
     Exit 0: no error. 1: an error. 2: an unreadable file or a wrong option. With --diff, exit 0: no changes.
     1: changes.
@@ -402,8 +403,8 @@ class CheckRun:
     """One check of many files.
 
     Attributes:
-        fold: Whether findings with one code share an output line; see `urdfkin.check`.
-        words: The files to check, each with the argument of the command that names it.
+        fold: Whether findings with the same code share a line of output; see `urdfkin.check`.
+        words: The files to check, each with the argument of the command that names it, such as a folder.
         _paths: The absolute path of each file. Each file is checked once.
         writes_baseline: True with --write-baseline. A finding of severity error then does not change the
             exit code.
@@ -440,7 +441,7 @@ class CheckRun:
     def check_files(self) -> None:
         for file, word in self.words.items():
             try:
-                # Only files on the command line may be pipes.
+                # A file may be a pipe only if the command line names it.
                 if file not in (word, f"./{word}"):
                     require_regular_file(Path(file))
                 self._check(str(resolve_package_uri(file)))
@@ -505,7 +506,7 @@ class CheckRun:
     def _is_unchanged(self, data: bytes, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
         """Return whether a file and its included files are unchanged since a commit.
 
-        The file contains `data`, and the commit contains `commit_files`.
+        `data` is the content of the file, and `commit_files` describes the files of the commit.
 
         Every file of the commit with a suffix in `suffixes` counts as included. A file that contains the name
         of a deleted file counts as changed.
@@ -529,7 +530,7 @@ class CheckRun:
             self.outcome.fixable_count += len(result.fixed_findings)
             self.outcome.patches.append(make_patch(file, text.data, result.text.data, escape_for_terminal))
             chosen, findings = make_predicate(), self.examine_text(result.text).findings
-            # `--fix` does not change a file with an error.
+            # `--fix` does not change a file with an error, so its unsafe fixes are not counted.
             if not any(finding.severity is Severity.ERROR for finding in findings):
                 self.outcome.unsafe_count += sum(
                     chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.allows_unsafe_fixes
@@ -563,7 +564,7 @@ def _find_writable_path(text: UrdfText) -> Path | None:
     return None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
 
 
-#: Suffixes of MJCF files and included MJCF files.
+#: Suffixes of MJCF files, and of files that an MJCF file includes.
 _MJCF = (".xml", ".mjcf")
 
 
@@ -574,7 +575,7 @@ def _is_usd_or_mjcf(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            # This return avoids the import of NumPy below.
+            # This return avoids the import below, which loads NumPy.
             return False
     from urdfkin.urdf.mjcf import is_mjcf
 

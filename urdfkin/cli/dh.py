@@ -24,8 +24,8 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import Answer, answer_command, report_compilation
 from urdfkin.cli.shell import complete_table
 
-#: Copy of `urdfkin.dh.export.FORMATS`, plus `urdf` and `svg`.
-#: An import of `urdfkin.dh.export` would slow `--help` down.
+#: Copy of `urdfkin.dh.export.FORMATS`, plus `urdf` and `svg`. The formats are copied, because an import of
+#: `urdfkin.dh.export` would slow `--help` down.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
@@ -157,11 +157,10 @@ form_options = combine(
 )
 
 
-#: With `--like`, a published table determines these options.
+#: Options that cannot be combined with `--like`, because the published table determines their values.
 _OPTIONS_FIXED_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 _DERIVATION_OPTIONS = ("convention", "near_parallel", "snap", "slide", "like", *_OPTIONS_FIXED_BY_LIKE)
-#: Options that require a new derivation of a table.
-#: Without these options, a table as ROBOT stays unchanged.
+#: If ROBOT is a Denavit-Hartenberg table, only these options make the command derive a new table.
 _NEW_TABLE_OPTIONS = ("base", "tip", "all_", "lock", "joints", *_DERIVATION_OPTIONS[1:])
 _PRINTED_TABLE_OPTIONS = ("degrees", "millimetres", "digits", "columns")
 
@@ -198,13 +197,14 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
-    The path may go down, up, or first up and then down. The table has the file's angles and lengths, without
-    rounding. The option --snap rounds angles, and prints a bound on the tip's displacement.
+    The path may go down or up the tree of links, or first up and then down. The table has the file's angles
+    and lengths, without rounding. The option --snap rounds angles, and prints a bound on the displacement of
+    the tip.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be a table (.toml,
-    .json, .csv, .tsv, .md, .tex, .txt). The command then writes the same table in the chosen convention.
-    Options such as --tip and --snap affect the rows. With these options, the command derives a new table. See
-    `urdfkin explain urdf-to-dh`.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. ROBOT can also be a table
+    (.toml, .json, .csv, .tsv, .md, .tex, .txt). The command then writes the same table in the chosen
+    convention. An option that affects the rows, such as --tip or --snap, makes the command derive a new
+    table. See `urdfkin explain urdf-to-dh`.
 
     Exit 0: verified, or the compared table agrees. 1: Pinocchio disagrees, or the compared table differs or
     contains a likely mistake. 2: bad input. 3: not checked, or a strict table has a larger rounding error

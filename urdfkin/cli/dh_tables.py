@@ -55,12 +55,11 @@ from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
 _MULTI_TABLE_FORMATS = ("terminal", "markdown", "latex", "json")
-#: Formats with the check's result below the table.
+#: Formats in which the result of the check is printed below the table.
 _FORMATS_WITH_CHECK_LINE = ("terminal", "markdown")
 _DOCUMENT_FORMATS = (*_FORMATS_WITH_CHECK_LINE, "html", "latex")
-#: Significant digits of the base and tool transforms.
-#: The mapping contains all formats with rounded numbers.
-#: None means the value of `--digits`.
+#: Number of significant digits of the base and tool transforms, for each format with rounded numbers. None
+#: means the value of `--digits`.
 _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -68,8 +67,8 @@ _TRANSFORM_DIGITS = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The values of the options of `urdfkin dh`.
 
-    `unchanged_table` is the path of a table or of screws. None: the input is another file, or an option in
-    `urdfkin.cli.dh._NEW_TABLE_OPTIONS` is given. `dh_arguments` are arguments of `Robot.dh`.
+    `unchanged_table` is the path of a file with a table or screws. It is None if ROBOT is another input, or
+    if an option such as --tip requires a new table. `dh_arguments` are arguments of `Robot.dh`.
     """
 
     robot: Robot
@@ -156,7 +155,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged_table is not None:
         table = read_table_or_screws(expand_home(request.unchanged_table))
-        # For screws, the code below derives a table.
+        # If the file contains screws, the rest of this function derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None
@@ -171,9 +170,9 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
 
 
 def _with_link_frames(request: DHRequest, table: DHTable) -> DHTable:
-    """Name base and tip as links, because joints can have equal names."""
+    """Name the table's base and tip as links, because a joint of the robot can have the same name."""
     links = link_names(table)
-    # A table from screws already has names such as "link:tip".
+    # A table that is derived from screws already has unambiguous names, such as "link:tip".
     if request.unchanged_table is None or not {links[0], links[-1]} <= set(request.robot.tree.links):
         return table
     return replace(table, base_frame=LinkFrame.of(links[0]), tip_frame=LinkFrame.of(links[-1]))
@@ -283,8 +282,8 @@ def _better_interpretation(
         return None
     metres = found.metres
     if not found.is_fitted:
-        # The search below needs the tip error after a fit.
-        # With `--no-fit`, `found.metres` is an error without a fit.
+        # `find_better_interpretation` needs the tip error after a fit. With --no-fit, `found.metres` is the
+        # tip error without a fit.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None

@@ -1,9 +1,8 @@
-"""Run a command: exit codes, error messages and a clean stop.
+"""Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
 
-SIGTERM and SIGHUP stop `urdfkin validate` like an interrupt: finished results are saved.
-
-Exit code 1 means a negative result, such as a disagreement. A crash never has exit code 1. After an uncaught
-exception, Python would exit with 1. urdfkin therefore catches unexpected exceptions and exits with 70.
+SIGTERM and SIGHUP stop `urdfkin validate` like an interrupt: finished results are saved. Exit code 1 always
+means a negative result, such as a disagreement, and never a crash. Python exits with 1 after an uncaught
+exception, so urdfkin catches unexpected exceptions and exits with 70.
 """
 
 from __future__ import annotations
@@ -34,14 +33,14 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, default: int) -> int:
-        """Return 128 + n after signal n, or `default` without a signal.
+        """Return 128 + n after signal n, as shells do, or `default` if no signal has arrived.
 
         A signal does not change the exit code 1, which reports a disagreement.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
 
     def interrupting(self, function: Callable[[_T], None]) -> Callable[[_T], None]:
-        """Return `function` with a call of `raise_if_signal` before it."""
+        """Return a function that calls `function`, or raises KeyboardInterrupt after a signal."""
 
         def call(argument: _T) -> None:
             self.raise_if_signal()
@@ -52,7 +51,7 @@ class Stop:
     def raise_if_signal(self) -> None:
         """Raise KeyboardInterrupt if a signal has arrived.
 
-        Python ignores exceptions in destructors. In a destructor, a signal handler's exception gets lost.
+        Python ignores an exception in a destructor, so the exception of a signal handler can get lost there.
         """
         if self.signal is not None:
             raise KeyboardInterrupt
@@ -65,7 +64,7 @@ def handle_signals() -> Iterator[Stop]:
     Later signals are ignored, so that finished results are saved.
     """
     stop = Stop()
-    # `nohup` ignores SIGHUP, so only default handlers are replaced.
+    # Only default handlers are replaced, so that SIGHUP stays ignored under `nohup`.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:
@@ -97,7 +96,7 @@ def run(command: click.Command, name: str) -> int:
     Pinocchio, refused or incomplete. 70: a defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
-        # After an interrupt, click's standalone mode would exit with 1.
+        # In standalone mode, click would exit with 1 after an interrupt.
         try:
             code = command.main(prog_name=name, standalone_mode=False)
         finally:
@@ -125,7 +124,7 @@ def report_error(error: UrdfkinError) -> int:
 def _report_usage_error(error: click.ClickException) -> int:
     context = getattr(error, "ctx", None)
     page = f"; see: {context.command_path} --help" if context is not None else ""
-    # For a missing argument, click's message has several lines.
+    # Click lists the choices of a missing argument on several lines.
     message = " ".join(error.format_message().split()).rstrip(".")
     say(f"urdfkin: error: {message}{page}", err=True)
     return error.exit_code
@@ -133,7 +132,7 @@ def _report_usage_error(error: click.ClickException) -> int:
 
 def report_crash(error: Exception) -> int:
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
-        # For example, pre-commit can install urdfkin with `--no-deps`.
+        # A dependency can be missing, for example if pre-commit installed urdfkin with --no-deps.
         remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"
         click.echo(f"urdfkin: error: {error.name} is not installed; {remedy}", err=True)
         return 2

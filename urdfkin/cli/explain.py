@@ -1,4 +1,4 @@
-"""`urdfkin explain`: print the page about a finding, an equation or a question."""
+"""`urdfkin explain`: print the page about a finding, an equation, or a question of docs/questions.md."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _CODE_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Map each heading's anchor to its section of docs/questions.md.
+    """Return each section of docs/questions.md, with the anchor of its heading as the key.
 
     Links become plain text.
     """
@@ -32,9 +32,9 @@ def answers() -> dict[str, str]:
 
 
 def find_answer(topic: str) -> str | None:
-    """Return a section of docs/questions.md, or None.
+    """Return the section of docs/questions.md that `topic` names, or None.
 
-    The section has the anchor `topic`. Otherwise, its anchor is the only one with all words of `topic`.
+    `topic` is the anchor of the section, or consists of words that only the anchor of this section has.
     """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
@@ -83,11 +83,11 @@ def _indent(code: str) -> str:
 def explain_command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
-    CODE is a finding's code or its short name. A finding's page has the reason, a bad example and a good
-    example. The page also describes the behaviour of other programs.
+    CODE is a finding's code or its short name. The page of a finding has the reason, a bad and a good
+    example, and the behaviour of other programs.
 
     EQUATION is the number of an equation in the textbook, such as 7.130. The page has the equation, the
-    implementing function, and the function's check.
+    function that implements it, and the check of this function.
 
     QUESTION is the name of a question, or a word of the name.
 
@@ -141,7 +141,7 @@ def explain_command(topic: str | None) -> None:
 
 
 def _list_matches(topic: str) -> list[str]:
-    """Return a line for each code and equation with all words of `topic`."""
+    """Return a line for each code and equation with all words of `topic` in its description."""
     words = topic.lower().split()
     if not any(map(str.isalpha, topic)):
         return []

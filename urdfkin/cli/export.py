@@ -1,6 +1,7 @@
 """Write files for other programs.
 
-`urdfkin export`: a frame's kinematics as code, with test vectors. `urdfkin vectors`: test vectors alone.
+`urdfkin export` writes a frame's kinematics as code, with test vectors. `urdfkin vectors` writes test vectors
+alone.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ from urdfkin.export import DEFAULT_QUANTITIES, FORMS, LANGUAGES
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
 
-#: Maps a suffix to languages. Without `--to`, the first language applies.
+#: The languages that a file with each suffix can contain. Without `--to`, the first of these languages is
+#: chosen.
 _LANGUAGES_OF_SUFFIXES = {
     **dict.fromkeys((".c", ".h"), ("c",)),
     **dict.fromkeys((".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx"), ("cpp",)),
@@ -51,7 +53,8 @@ _LANGUAGES_OF_SUFFIXES = {
     ".m": ("matlab",),
     ".tex": ("latex",),
 }
-#: Maps a common name to the name that `--to` accepts.
+#: Common names of languages and libraries. If the user gives such a name, the error message suggests the name
+#: that `--to` accepts.
 _LANGUAGE_SYNONYMS = {
     "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
 }  # fmt: skip
@@ -117,14 +120,14 @@ def export_command(
 ) -> None:
     """Write a frame's kinematics as code without loops, with test vectors.
 
-    The code contains the robot's constants. Each joint's sine and cosine are computed once. Before the
+    The code contains the robot's constants, and each joint's sine and cosine are computed once. Before the
     command writes the file, Pinocchio checks the expressions. The file states the largest disagreement of
     each quantity.
 
     The file also contains test vectors with true values at fifty digits. The option --check compiles or
     imports a file and runs its test vectors. You can also run the test vectors without urdfkin.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
 
     Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
     3: not verified, or changed after it was written.
@@ -201,19 +204,18 @@ def vectors_command() -> None:
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
 @answer_command()
 def write_vectors(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
-    """Write test vectors (inputs, results and tolerances) into the folder DIR.
+    """Write test vectors into the folder DIR: inputs and results, with a tolerance for every result.
 
     The results are computed at 50 digits, and written with 17 digits.
 
-    The command writes the test vectors of the named robots. Without a name, the catalogue and some 70 small
-    robots are used. Each small robot tests one feature of URDF. Each robot has a JSON file and a text file.
-    The text file contains the same numbers, separated by tabs. The file SHA256SUMS has the digests of all
-    files.
+    If you name robots, the command writes only the test vectors of these robots. If you name no robot, the
+    command writes test vectors of the catalogue and of some 70 small robots. Each small robot tests one
+    feature of URDF. Each robot has a JSON file, and a text file with the same numbers, separated by tabs. The
+    file SHA256SUMS has the digests of all files.
 
-    The results are placement, velocity, Jacobian, Jacobian rate and Hessian. The classical and the spatial
-    acceleration are results too. The files contain the placement once. All other quantities are in the
-    reference frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on
-    --samples.
+    The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
+    spatial acceleration. The files contain the placement once, and each other quantity in the reference
+    frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on --samples.
     """
     from urdfkin.validation import vectors
 

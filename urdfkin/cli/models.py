@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots.
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: `recheck`, and the options that `--recheck` excludes.
+#: The option `--recheck`, and all options that cannot be combined with it.
 _COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
-#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
-#: `urdfkin diff` accepts a file with such a name.
+#: A text that looks like a git revision, such as HEAD~1, main^ or HEAD:arm.urdf. `urdfkin diff` rejects such
+#: a text, unless a file has this name.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 
@@ -114,28 +114,28 @@ def same_command(
 ) -> Answer:
     """Prove whether A and B are the same robot in every configuration.
 
-    If you name more than two robots, the command compares each pair. A and B are paths, names from `urdfkin
-    robots`, or Denavit-Hartenberg tables.
+    If you name more than two robots, the command compares each pair. A and B are paths, names that `urdfkin
+    robots` lists, or Denavit-Hartenberg tables.
 
-    A and B are the same robot if all joint screws agree. In the zero configuration, all link poses must also
-    agree. Fixed links, names and the order of joints may differ.
+    A and B are the same robot if the screws of all joints and the zero-configuration poses of all links
+    agree. Fixed links, names and the order of joints may differ. A and B are equivalent if some changes of B
+    make B the same robot as A. For example, B may need another base pose, or another zero position of a
+    joint.
 
-    Some changes of B can make B the same robot as A. A and B are then equivalent. For example, B may need
-    another base pose, or another joint zero.
+    If A and B differ, the command compares each frame of B with the same frame of A. For the largest distance
+    between the two frames, the command prints a lower and an upper bound. The command also prints a
+    configuration in which the distance is at least the lower bound. The upper bound is proven for all
+    configurations within the joint limits.
 
-    If A and B differ, the command compares matching frames. For the largest distance, the command prints a
-    lower and an upper bound. In the printed configuration, the distance is at least the lower bound. The
-    upper bound is proven for all configurations within the joint limits.
-
-    The numbers of a USD file are rounded to single precision. These rounding errors may explain the
-    difference of every joint. A and B are then the same up to single precision.
+    The numbers of a USD file are rounded to single precision. If these rounding errors explain the difference
+    of every joint, A and B are the same up to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
     1: the models are different. 2: bad input.
 
-    With --strict, the exit code is also 1 for equivalent models. The same applies to differences without
-    effect on motion. Examples are other limits, revolute instead of continuous joints, or additional fixed
-    links.
+    With --strict, the exit code is also 1 for models that are equivalent only after changes of B. The exit
+    code is also 1 for differences that have no effect on motion. Examples are other limits, the type revolute
+    instead of continuous, or an additional fixed link.
 
     With --within, the command does not change B before the comparison. Exit 0: every frame is proven to be
     within the given distance. 1: the proof fails for at least one frame.
@@ -228,14 +228,14 @@ def _recheck_certificate(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @source_options
 @answer_command()
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
-    """List all changes from OLD to NEW, and the displacements of frames.
+    """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
-    For each changed joint, the command prints the most displaced frame. The printed displacement is the
-    largest in all configurations within the joint limits. If the changes only rotate frames, the command
-    prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The last line is the
-    largest displacement by all changes together.
+    For each changed joint, the command prints the frame that the joint's changes displace most. The printed
+    displacement is the largest in all configurations within the joint limits. If the changes only rotate
+    frames, the command prints the largest rotation. OLD and NEW are compared at equal joint coordinates. The
+    last line of the output is the largest displacement by all changes together.
 
-    OLD and NEW may have different formats (URDF, MJCF or USD). The command then prints the differences that
+    If OLD and NEW have different formats (URDF, MJCF or USD), the command prints the differences that
     `urdfkin same` finds. If you name more than two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
@@ -293,13 +293,13 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 @seed_option
 @answer_command()
 def readers_command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
-    """Compare how other libraries read ROBOT: joints, joint order and link poses.
+    """Compare how other libraries read ROBOT: the joints, the joint order, and the poses of all links.
 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
     Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each
     library reads the file in its own process. The command compares the poses of all links with urdfkin's
-    poses. For a joint that a library reads differently, the command names the cause. An example is the
-    joint's `axis`.
+    poses. If a library reads a joint differently, the command names the element of the file that causes the
+    difference, for example the joint's `axis`.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """

@@ -73,13 +73,11 @@ def format_from_suffix(
     default_format: str,
     parameter: str = "format_",
 ) -> str:
-    """Return the output format from an option or the output file's suffix.
+    """Return the output format that an option or the suffix of the output file selects.
 
     `parameter` is the name of the option's value in `context.params`. `formats` lists the formats of each
-    suffix, for example `{".py": ("numpy", "sympy")}`. The first format is the default.
-
-    Raise InputError if the option contradicts the suffix. Without the option, an unknown suffix also raises
-    InputError.
+    suffix, for example `{".py": ("numpy", "sympy")}`. The first format is the default. Raise InputError if
+    the option contradicts the suffix, or if the suffix is unknown and the option is not given.
     """
     format_: str = context.params[parameter] or default_format
     if output is None:
@@ -111,7 +109,7 @@ def is_on_command_line(context: click.Context, name: str) -> bool:
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
-    """Raise an InputError such as "--format does nothing with --opw"."""
+    """Raise InputError if an option in `unused` is given, for example "--format does nothing with --opw"."""
     for parameter in context.command.params:
         if parameter.name in unused and is_on_command_line(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
@@ -121,7 +119,7 @@ def reject_unused_options(context: click.Context, unused: Collection[str], becau
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: Number of samples for the word `random` without a count.
+#: Number of samples that an option with the value `random` draws, for example `--q random`.
 _RANDOM_SAMPLES = 1
 
 
@@ -140,7 +138,7 @@ _LOAD_OPTIONS_KEY = "urdfkin.load_options"
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
     """Return a callback that stores an option's value for `load_options`.
 
-    With `always`, the callback also stores the default of an omitted option.
+    With `always`, the callback also stores the default value of an option that the user omits.
     """
 
     def store_option(context: click.Context, _: click.Parameter, value: Any) -> None:
@@ -368,7 +366,7 @@ def lock_settings(robot: Robot) -> dict[str, Any]:
 
 
 def locked_line(robot: Robot) -> str:
-    """Return a line with the value of each locked joint, or ""."""
+    """Return one line with the value of each locked joint, or "" if no joint is locked."""
     units = {name: "rad" if robot.joints[name].original.kind.turns else "m" for name, _ in robot.origin.lock}
     values = ", ".join(f"{name} at {value:.6g} {units[name]}" for name, value in robot.origin.lock)
     return f"locked: {values}" if values else ""
@@ -417,7 +415,7 @@ class Inputs:
         return replace(self, settings={**self.settings, **more})
 
 
-#: Prefix of the codes about masses, shapes and colours.
+#: Prefix of the codes of findings about masses, shapes and colours.
 _NON_KINEMATIC_FINDINGS = "URDF7"
 
 
@@ -444,7 +442,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def disabled_options(source: str) -> dict[str, Any]:
-        """Disable options for xacro and USD files that do not apply to `source`."""
+        """Return arguments of `load` that disable xacro or USD options which only another source needs."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -466,10 +464,10 @@ def read_inputs(
     option: str = "--q",
     conversion: Conversion | None = None,
 ) -> Inputs:
-    """Read q, v and a, and convert them from `conversion` to urdfkin's convention.
+    """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    A single sample is repeated for all samples of the other arrays. The argument `option` is the option for
-    q. If `option` is not --q, the caller must reject an unused --seed.
+    A single sample of q, v or a is repeated for all samples of the other arrays. The argument `option` is the
+    option for q. If it is not --q, the caller must reject an unused --seed.
     """
     import numpy as np
 
@@ -539,8 +537,8 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample per line.
 
-    Return the samples, and the layout that fits the file's number of columns. A layout is a list of column
-    names. `units` is as in `read_columns`.
+    Return the samples, and the layout with as many names as the file has columns. A layout is a list of
+    column names. `units` is as in `read_columns`.
     """
     import numpy as np
 
@@ -601,7 +599,7 @@ _BASE_MOTION_OPTIONS = {
 def base_motion_options(inputs: str) -> Callable[[_F], _F]:
     """Make the options for the motion of the root link.
 
-    `inputs` contains the letters of the options: q (pose), v (velocity), a (acceleration).
+    `inputs` contains q for the pose, v for the velocity and a for the acceleration.
     """
     return combine(*(_BASE_MOTION_OPTIONS[letter] for letter in inputs))
 

@@ -1,4 +1,4 @@
-"""Print the result of a command, or write the result in another format.
+"""Print the result of a command as a table, or write it in another format.
 
 A file is written completely or not at all.
 """
@@ -37,9 +37,8 @@ _SUFFIXES = {
     "latex": ".tex",
 }  # fmt: skip
 _F = TypeVar("_F", bound=Callable[..., Any])
-#: Maximum number of characters in a line of a table.
-#: Each cell is as wide as its column's widest cell.
-#: Without this limit, one long name could fill the memory.
+#: Maximum number of characters in a line of a table. Cells are padded to the widest cell of their column, so
+#: one very long name could fill the memory.
 _MAX_WIDTH = 10_000
 
 
@@ -62,10 +61,11 @@ class Answer:
 
     Attributes:
         document: Function that returns the texts and tables for the formats in `TEXT_FORMATS`.
-        data: A function for each other format. The functions return a mapping (JSON), rows (CSV), an array
-            (npy), or text. A function for a format in `TEXT_FORMATS` replaces `document` in this format.
-        check: Last line of the output, such as "verified by Pinocchio: ..."; "" without a check.
-        fit_document: Function that fits a document to a terminal's width; None: `document`.
+        data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
+            array for npy, or the output as text. A function for a format in `TEXT_FORMATS` replaces
+            `document` in this format.
+        check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
+        fit_document: Function that returns a document for the width of a terminal; None to use `document`.
     """
 
     document: Callable[[], TextDocument]
@@ -82,7 +82,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the output in the format `form`, and whether it contains `check`."""
+        """Return the output in the format `form`, and whether the output already contains `check`."""
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -120,7 +120,7 @@ _CONVERTERS: dict[str, Callable[[Any], bytes | str]] = {
 def answer_command(
     *names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None
 ) -> Callable[[Any], Any]:
-    """Make a command with --format and --output; its function returns an `Answer`."""
+    """Make a command with --format and --output from a function that returns an `Answer`."""
     forms = names or (*TEXT_FORMATS, "json", "csv")
     formats = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
     default_format = "csv" if "csv" in forms and "table" in forms else forms[0]
@@ -165,7 +165,7 @@ def report_compilation() -> Iterator[None]:
 def make_console(*, err: bool = False) -> Console:
     """Return a console.
 
-    Outside a terminal, the environment variable COLUMNS sets the width.
+    If the stream is no terminal, the environment variable COLUMNS sets the width in characters.
     """
     from urdfkin.cli.terminal import Terminal
 
@@ -188,14 +188,14 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if `write_file` cannot write an output file.
 
-    Two options of a command may not name the same file. This check does not detect a full disk; `write_file`
-    does.
+    Raise UsageError if two options of a command name the same file. This check does not detect a full disk;
+    `write_file` does.
     """
     context = click.get_current_context(silent=True)
     targets: set[Path] = set() if context is None else context.meta.setdefault("output files", set())
     for path in filter(None, paths):
         try:
-            # `write_file` makes no temporary file for devices and pipes.
+            # `write_file` writes to a device or a pipe directly, without a temporary file.
             if path.exists() and not path.is_file():
                 continue
             target = path.resolve()
@@ -227,7 +227,7 @@ def certificate_exit_code(certificate: Certificate) -> int:
 
 
 def format_pinocchio_check(check: object | None) -> tuple[str, int]:
-    """Return a line about Pinocchio's check, and the command's exit code.
+    """Return a line with the result of Pinocchio's check, and the command's exit code.
 
     `check` is the result of the check, or None if nothing was checked.
     """

@@ -49,15 +49,15 @@ if TYPE_CHECKING:
 def chain_command(
     robot: str, base: str | None, tip: str | None, q: str, convention: str | None, seed: int, verify: bool
 ) -> Answer:
-    """List the joints and axes on the path between two frames (section 7.5).
+    """List the joints on the path between two frames (section 7.5), with their axes in one configuration.
 
-    The table shows one configuration, in metres and in the base's axes. A joint's row has axis z, origin O,
-    and vector d to the next origin. The last vector d leads to the tip.
+    For each joint, the table has the axis z, the origin O, and the vector d to the origin of the next joint.
+    All vectors are in the axes of the base; O and d are in metres. The last vector d leads to the tip.
 
-    At a "backwards" joint, the path leads from the child link to the parent link. The axis z of such a joint
-    is reversed. The joint's coordinate therefore has the same sign as in the URDF. The table does not list
-    fixed joints. The offset of a fixed joint is a part of a vector d. The option --q gives the configuration
-    of the whole robot.
+    The mark "backwards" means that the path leads from a joint's child link to its parent link. The axis z of
+    a backwards joint is reversed, so that its coordinate has the same sign as in the URDF. The table does not
+    list fixed joints. The offset of a fixed joint is a part of a vector d. The option --q gives the
+    configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -140,13 +140,13 @@ _SCREW_SUFFIXES = {
 @verify_option
 @answer_command(*SCREW_FORMATS, suffixes=_SCREW_SUFFIXES)
 def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
-    """Derive the product of exponentials of a path, as in Lynch and Park.
+    """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
-    The result is the pose M in the zero configuration, and the screws. Each joint's screw is given in space
-    axes and in body axes. A screw is a vector (w, v), with the angular velocity w first. In generated code,
-    screws are columns of the matrices Slist (space axes) and Blist (body axes). The result can be written as
-    a TOML or JSON file. Commands that take a ROBOT can load this file. In your own file, name the pose `M`.
-    Name the screws `space` or `body`.
+    The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A screw
+    is a vector (w, v), with the angular velocity w first. In generated code, each screw is a column of the
+    matrix Slist (space axes) or Blist (body axes). The result can be written as a TOML or JSON file. Commands
+    that take a ROBOT can load this file. If you write such a file by hand, write the pose as `M`, and the
+    screws as `space` or as `body`.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -184,11 +184,11 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 def structure_command(
     robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
 ) -> Answer:
-    """Find an arm's parallel and intersecting axes, class (such as SCARA) and solvers.
+    """Find parallel and intersecting axes of an arm, its class (such as SCARA), and solvers for it.
 
-    The axes of a calibrated arm are never exactly parallel. The command therefore allows deviations of up to
-    0.02 rad or 5 mm. The deviation is printed. Pinocchio checks the screws of the arm's joints. JSON is in
-    metres and radians.
+    A property such as parallel axes is reported if the deviation is at most 0.02 rad or 5 mm. The tolerance
+    is needed because the axes of a calibrated arm are never exactly parallel. The deviation is printed.
+    Pinocchio checks the screws of the arm's joints. JSON is in metres and radians.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

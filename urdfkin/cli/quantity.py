@@ -1,4 +1,4 @@
-"""Define commands that compute a frame's quantity, such as `urdfkin jacobian`.
+"""Define the commands that compute a quantity of a frame, such as `urdfkin jacobian`.
 
 `make_command` uses the quantities in `verify/quantities.py`.
 """
@@ -240,7 +240,7 @@ def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.has_columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.velocity_names]
-        # A CSV line contains the derivatives of one Jacobian entry.
+        # In the CSV of a Hessian, each line contains the derivatives of one Jacobian entry.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.ndim):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -257,7 +257,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Headings of the first CSV column, without and with times.
+#: Headings of the first column of CSV output, for samples without times and with times.
 _SAMPLE_HEADINGS = ("sample", "t")
 
 
@@ -272,8 +272,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    # A row x, y, z has three numbers.
-    # A pose with a quaternion has seven numbers.
+    # A table with the columns x, y and z needs three numbers in each row. A pose with a quaternion has seven
+    # numbers, so it becomes a single row.
     if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
@@ -284,8 +284,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
-    A Hessian's row is a Jacobian column's derivative by a joint coordinate. Rows with only rounding errors
-    are left out.
+    For a Hessian, each row contains the derivative of one Jacobian column with respect to one joint
+    coordinate. Rows with only rounding errors are left out.
     """
     import numpy as np
 
@@ -376,13 +376,14 @@ _POSE_FORMS = {
     ),
 )
 def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any) -> Answer:
-    """Compute a frame's pose (eq. 7.77) in the world or another frame, in metres.
+    """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
 
-    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position with angles or
-    a quaternion. Pinocchio checks that these numbers give the same rotation as T.
+    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position and three
+    angles, or a position and a quaternion. Pinocchio checks that the angles or the quaternion give the same
+    rotation as T.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path may lead to a
-    Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may
+    also be a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
@@ -400,7 +401,7 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
 
 
 def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> FloatArray:
-    """Convert each pose to six numbers (angles) or seven numbers (quaternion)."""
+    """Convert each pose to a position with three angles (six numbers) or a quaternion (seven numbers)."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
@@ -461,9 +462,9 @@ REPRESENTATIONS = (
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    Each row contains the time derivatives of the position and of the orientation numbers. These numbers are
-    Euler angles or a quaternion. Row i belongs to the joint velocity v_i = 1; all other velocities are 0.
-    `urdfkin jacobian` prints angular velocities instead.
+    Each row of the printed table contains the time derivatives of the position and of the numbers that
+    represent the orientation. These numbers are Euler angles or a quaternion. In row i, the joint velocity
+    v_i is 1, and all other joint velocities are 0. `urdfkin jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import MIN_SINGULARITY_DISTANCE
 
@@ -500,11 +501,11 @@ def orientation_labels(representation: str) -> tuple[str, ...]:
     ),
 )
 def imu_command(gravity: str, **_: Any) -> Answer:
-    """Compute an accelerometer's and a gyroscope's readings on a frame, in its axes.
+    """Compute the readings of an accelerometer and a gyroscope on a frame, in the frame's own axes.
 
-    The accelerometer reads the proper acceleration in m/s^2. This is the second time derivative of the
-    frame's position, minus gravity's acceleration. With the default --gravity, an accelerometer at rest reads
-    9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
+    The accelerometer reads the proper acceleration in m/s^2. The proper acceleration is the second time
+    derivative of the frame's position, minus the acceleration of gravity. With the default --gravity, an
+    accelerometer at rest reads 9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
 
     The input is a configuration --q, joint velocities --v and joint accelerations --a. The input may also be
     a batch of configurations, or a --trajectory.
@@ -543,16 +544,17 @@ def imu_command(gravity: str, **_: Any) -> Answer:
 def singular_values_command(rows: str, **_: Any) -> Answer:
     """Compute the singular values, condition number and manipulability of a frame's Jacobian.
 
-    Each value has a guaranteed lower and upper bound. The bounds include the errors of the Jacobian and the
-    decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular values. The
-    Hessian yields the manipulability's derivatives by the joint coordinates.
+    Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
+    rounding errors of the decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of
+    the singular values. The command also computes the manipulability's derivative with respect to each joint,
+    from the frame's Hessian.
 
-    At a singularity, the command prints the rank and the lost directions. The command also prints the joints
-    that cause the singularity. The manipulability may have no derivative at a singularity. CSV then contains
-    nan, and JSON contains null. See `urdfkin explain singularity`.
+    At a singularity, the command prints the rank, the lost directions, and the joints that cause the
+    singularity. The manipulability may have no derivative at a singularity. CSV then contains nan, and JSON
+    contains null. See `urdfkin explain singularity`.
 
-    With --convention, the derivatives are by the joint coordinates of that convention. The singular values
-    are always for joint velocities in rad/s and m/s.
+    With --convention, the derivatives are with respect to the joint coordinates of that convention. The
+    singular values are always for joint velocities in rad/s and m/s.
     """
     from urdfkin.system.documents import as_json_data
 
@@ -616,7 +618,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _values_with_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield each quantity of sample `k`: name, [value, lower bound, upper bound]."""
+    """Yield each quantity of sample `k`: its name and the list [value, lower bound, upper bound]."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     yield "condition", [float(side[k]) for side in found.condition]

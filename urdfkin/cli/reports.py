@@ -52,10 +52,7 @@ report_options = combine(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write a report in the requested formats.
-
-    Return the exit code of the first write error, or 0.
-    """
+    """Write a report in the requested formats, and return the exit code of the first write error, or 0."""
     codes = [
         _write(document, name, path) for name in REPORT_FILE_OPTIONS if (path := files[name]) is not None
     ]
@@ -116,8 +113,8 @@ class _ReportGroup(click.Group):
 def report_command() -> None:
     """Show, convert or compare the results of earlier validations.
 
-    RESULTS is the FILE of `urdfkin validate --json FILE`, or the DIR of `--store DIR`. `urdfkin report
-    RESULTS` is short for `urdfkin report show RESULTS`.
+    RESULTS is the JSON file from `urdfkin validate --json FILE`, or the folder from `--store DIR`. `urdfkin
+    report RESULTS` is short for `urdfkin report show RESULTS`.
     """
 
 
@@ -129,8 +126,8 @@ def report_command() -> None:
 def show_report(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
     """Show a report, or convert it to HTML, JUnit or Markdown.
 
-    RESULTS is the FILE of `urdfkin validate --json FILE`, or the DIR of `--store DIR`. The validation may
-    still be running. With missing robots, a validation is shown as interrupted.
+    RESULTS is the JSON file from `urdfkin validate --json FILE`, or the folder from `--store DIR`. The
+    validation may still be running; a validation with missing robots is shown as interrupted.
 
     The command ends with the exit code of the validation. 0: everything verified. 1: a disagreement. 2: a
     robot could not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
@@ -221,16 +218,16 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 @schema_option("urdfkin.report.history:HISTORY", "the data")
 @answer_command(*TEXT_FORMATS, "json")
 def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
-    """Show how each robot's results changed over several runs of `urdfkin validate`.
+    """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
-    The arguments are reports (JSON files) or folders. A folder is a store (`urdfkin validate --store`), or
-    contains reports and stores. Runs are ordered by their start. A robot is identified by its source (a path
-    or a catalogue name). After the file was renamed, the robot is identified by its name. Changes and
-    regressions are defined as in `urdfkin report compare`. With `--output history.html`, the command writes
-    charts. The HTML page works offline.
+    The arguments are reports (JSON files), stores (folders of `urdfkin validate --store`), or folders with
+    reports and stores. Runs are ordered by their start. The command identifies a robot by its source, which
+    is a path or a name of the catalogue. If a robot's file was renamed, the command identifies the robot by
+    its name. Changes and regressions are defined as in `urdfkin report compare`. With `--output
+    history.html`, the command writes an HTML page with charts, which works offline.
 
-    For an unusable file, the command prints the file's name and the reason. The other files are shown. Exit
-    0: every file was used. 2: a file cannot be used.
+    If a file cannot be used, the command prints the file's name and the reason, and shows the other files.
+    Exit 0: every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import as_html, document, read_history
 

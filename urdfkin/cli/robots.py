@@ -1,6 +1,6 @@
 """`urdfkin robots`: list the robots of the catalogue. `urdfkin info`: show one robot.
 
-`urdfkin order`: print the joint order of each tool, and code for conversions.
+`urdfkin order`: print the joint order of each tool, and code that converts one convention to another.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def robots_command(family: str | None) -> Answer:
     """List the robots of the catalogue, which every command loads by name.
 
     The catalogue contains the URDF files of the package example-robot-data and of urdfkin. The columns base
-    and tip show the defaults of --base, --tip and --frame.
+    and tip show the default frames of the options --base, --tip and --frame.
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
@@ -77,12 +77,13 @@ _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 @robot_argument
 @answer_command()
 def info_command(robot: str) -> Answer:
-    """Show links, joints, axes, limits, mimic rules, and indices in q and v.
+    """Show a robot's links, joints, axes, limits, mimic rules, and indices in q and v.
 
-    The joints have the order of q, v and the Jacobian's columns. Pinocchio uses the same order of the joints.
-    The last line reports whether the file lists the joints in another order. Limits are in rad and rad/s. The
-    limits of prismatic joints are in m and m/s. The first link is the root. In the drawn tree, a branch leads
-    to each of several children. A link without a branch is the only child of the link above.
+    The joints have the same order as in q, in v and in the columns of a Jacobian. Pinocchio uses the same
+    order. The last line reports whether the file lists the joints in another order. Limits are in rad and
+    rad/s, or in m and m/s for prismatic joints. The first link is the root. If a link has several children, a
+    branch of the drawn tree leads to each child. A link without a branch is the only child of the link above
+    it.
     """
     loaded = load_robot(robot)
     data = {
@@ -95,7 +96,7 @@ def info_command(robot: str) -> Answer:
 
 
 def _fit_to_terminal(out: Console, document: TextDocument) -> TextDocument:
-    """Merge the columns of links and joints if the terminal is too narrow."""
+    """Merge the columns of links and joints if a table is wider than the terminal."""
     from urdfkin.report.listing import fits
 
     parts = list(document.parts)
@@ -129,13 +130,12 @@ _UNKNOWN_ORDER_NOTE = (
 @click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to.", show_default="urdfkin")
 @answer_command()
 def order_command(robot: str, start: str | None, end: str | None) -> Answer:
-    """Show the joint order of Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
+    """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 
-    For each joint and tool, the table contains the joint's index in q. If the index in v differs, the table
-    contains two indices: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With --from or
-    --to, the command prints Python code for converting q and v. NAME is a tool in the table. FILE is a TOML
-    file with your own convention (docs/conventions.md). The convention defines order, signs, units and motor
-    zeros.
+    For each joint and tool, the table contains the joint's index in q. If the joint's index in v differs, the
+    table contains both indices: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With
+    --from or --to, the command prints Python code that converts q and v. NAME is a tool in the table. FILE
+    is a TOML file that defines your own order, signs, units and motor zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
@@ -178,7 +178,7 @@ def _orders(robot: Robot) -> Answer:
 
 
 def _index_cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return each joint's indices as text: "7", "7-13", or "-" for none.
+    """Return the indices of each joint as text, for example "7", "7-13", or "-" for none.
 
     "7/6" means index 7 in q and index 6 in v.
     """

@@ -1,9 +1,9 @@
 """`urdfkin completion`: complete the words of a command in a shell. `urdfkin warm`: compile all kernels.
 
-Completion must be fast, so this module imports no large package.
+Completion runs at each press of the Tab key. It must be fast, so this module imports no large package.
 
-A malicious name, such as `$(...)`, could make the shell run a command. Completion therefore offers only names
-without characters that a shell interprets.
+A malicious name in a robot file, such as `$(...)`, could make the shell run a command. Completion therefore
+offers only names without characters that a shell interprets.
 """
 
 from __future__ import annotations
@@ -24,14 +24,12 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Names that completion offers.
-#: These names contain no character that a shell interprets.
-#: Bash separates words at colons, so colons are excluded.
+#: Completion offers only these names, because they contain no character that a shell interprets. The pattern
+#: also excludes colons, because Bash separates words at colons.
 _SAFE_NAME = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a file for frame names.
+#: Maximum size (bytes) of a file from which shell completion reads frame names.
 _MAX_BYTES = 10_000_000
-#: XML elements that define frames.
-#: In a URDF, only children of <robot> define frames.
+#: XML elements that define frames. In a URDF, only elements directly below <robot> define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
@@ -44,8 +42,8 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    # During completion of an option, click has not parsed ROBOT.
-    # ROBOT is then the first unparsed argument.
+    # During completion of an option, click has not parsed ROBOT. Completion therefore uses the first unparsed
+    # argument as ROBOT.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 
@@ -102,10 +100,10 @@ def _frames(word: str) -> Iterator[str]:
 def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
     """Print the completion script for a shell.
 
-    The script completes commands, options and the choices of options. The script also completes robots,
-    files, reference tables, finding codes and equation numbers. The completed frames are those of the robot
-    on the command line. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To activate
-    the script, add the line for your shell to its startup file:
+    The script completes commands, options and the choices of options. It also completes robots, files,
+    reference tables, codes of findings, numbers of equations, and the frames of the robot on the command
+    line. Frames are read from a URDF or MJCF file, but a .xacro file is not expanded. To activate the script,
+    add the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"
@@ -125,9 +123,9 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
 def warm_command() -> None:
     """Compile all kernels (machine code) and store them, for container images and CI.
 
-    Without this command, urdfkin computes in plain Python at first. After more than a second in plain Python,
-    urdfkin compiles a kernel. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.
-    On another processor, the kernels are compiled again.
+    Without this command, urdfkin computes in plain Python at first. It compiles a kernel when plain Python
+    needs more than a second in total, for example for a large batch. Each compilation takes some seconds.
+    Kernels are stored below XDG_CACHE_HOME. On another processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """

@@ -1,11 +1,11 @@
 """Write to the standard streams without tracebacks, and escape control characters in names.
 
-A write fails if standard output is closed, or if the disk is full. A write to a pipe fails if the reader
-exits early. The encoding may also lack a character of a joint's name.
+A command ends without a traceback if standard output is closed, if the disk is full, or if the reader of a
+pipe exits early. The same applies if the encoding does not support a character of a joint's name.
 
-`wrap_streams` wraps standard output and standard error in a `SafeStream`. A `SafeStream` escapes control
-characters and commands of CI services. Most line feeds end an output line. A `SafeStream` therefore does not
-escape line feeds. The function `say` and the class `Terminal` escape line feeds in names.
+`wrap_streams` wraps standard output and standard error in a `SafeStream`, which escapes control characters
+and commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of
+output. The function `say` and the class `Terminal` escape line feeds in names.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import click
 from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import CI_COMMAND_ANYWHERE, CI_COMMANDS, escape_sequence, escape_unprintable
 
-#: Exit code after a write to a closed pipe.
+#: Exit code of shells for a program that writes to a closed pipe.
 BROKEN_PIPE_EXIT_CODE = 128 + signal.SIGPIPE
 
 
@@ -33,7 +33,7 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Each command itself reports joint values that look like degrees.
+    # DegreesWarning is hidden, because each command itself reports joint values that look like degrees.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -43,9 +43,9 @@ def flush_output() -> None:
 
 
 class _RawStream(io.FileIO):
-    """A standard stream: a write error on stdout ends the command.
+    """A standard stream; a write error on standard output ends the command.
 
-    Write errors on stderr are ignored.
+    Write errors on standard error are ignored.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -71,7 +71,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _report_write_errors(stream: Any, descriptor: int) -> Any:
-    """Make a standard stream report write errors; return other streams unchanged."""
+    """Wrap a standard stream, so that it reports write errors; return other streams unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -92,7 +92,7 @@ def _open_closed_streams() -> None:
 
     Otherwise, the next opened file would get the stream's descriptor.
 
-    Standard input is opened write-only and standard output read-only. Their use therefore fails.
+    Standard input is opened write-only and standard output read-only, so that their use fails.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -114,10 +114,10 @@ def _show_warning(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: Escape sequences for colours and progress bars (package `rich`).
+#: Escape sequences that the package `rich` writes for colours and progress bars.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum length of an unfinished line that is stored completely.
-#: The line is stored, because several writes can form one command.
+#: Maximum number of stored characters of an unfinished line. A longer line is stored only in part. The stream
+#: stores unfinished lines because a CI command may be written in several pieces.
 _MAX_STORED = 64
 
 
@@ -136,7 +136,7 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
-        # Escape sequences for colours stay unchanged.
+        # Control characters and CI commands are escaped only between the escape sequences for colours.
         pieces[::2] = [self._escape_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
@@ -183,9 +183,8 @@ class SafeStream:
         escaped_indices = [
             m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before
         ]
-        # Of a long line, only the last 16 characters are stored.
-        # The "x" replaces the deleted characters.
-        # Without "x", a stored "::" could begin the line.
+        # Only the last 16 characters of a long line are stored. The "x" replaces the deleted characters, so
+        # that a remaining "::" is not at the start of the line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (
@@ -199,7 +198,7 @@ class SafeStream:
 
 
 def _escape_unprintable(text: str) -> str:
-    """Escape unprintable characters, except line feeds and tabs, as in JSON."""
+    """Escape unprintable characters, except line feeds and tabs, as in JSON, TOML and Python."""
     if text.isprintable():
         return text
     return "".join(c if c in "\n\t" or c.isprintable() else escape_sequence(c) for c in text)
@@ -209,7 +208,8 @@ def wrap_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # click would bypass a stream that reports the encoding ASCII.
+            # The encoding is set to UTF-8, because click would bypass a stream that reports the encoding
+            # ASCII.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 
@@ -237,7 +237,7 @@ def say_file_content(text: str) -> None:
 
 
 def escape_for_terminal(text: str) -> str:
-    """Escape a text as `say_file_content` does, without printing."""
+    """Escape a text as `say_file_content` does, but do not print it."""
     return SafeStream(sys.stdout).escape_file_content(text)
 
 

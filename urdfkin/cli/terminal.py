@@ -22,13 +22,13 @@ class Terminal(Console):
         safe.styled = self.is_terminal
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print tables and texts; texts are not wrapped, so users can copy them."""
+        """Print tables and texts; texts are not wrapped, so that users can copy them."""
         texts = [escape_unprintable(o) if isinstance(o, str) else o for o in objects]
         only_text = all(isinstance(o, str) for o in objects)
         if self.is_terminal or only_text:
             super().print(*texts, **{"soft_wrap": only_text} | options)
             return
-        # The package `rich` adds blanks at the end of lines.
+        # The package `rich` pads the lines of a table with blanks, which are removed here.
         with self.capture() as capture:
             super().print(*texts, **options)
         self.file.write(_TRAILING_BLANKS.sub("", capture.get()))

@@ -1,4 +1,4 @@
-"""`urdfkin validate`: compare all frames and joints with Pinocchio; study the accuracy."""
+"""`urdfkin validate`: compare every frame and joint with Pinocchio on many samples; study the accuracy."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ def study_all(
     how: Mapping[str, Any],
     raise_if_signal: Callable[[], None] = lambda: None,
 ) -> ValidationReport:
-    """Run the accuracy study of each compared robot, and return the extended report.
+    """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
-    `how` are arguments of `load`. With `shard`, such as "1/4", only robots with their first sample in this
-    shard are studied. An interrupt skips the remaining robots.
+    `how` are arguments of `load`. With `shard`, for example "1/4", only the robots with their first sample in
+    this part of the validation are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -89,7 +89,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyStore | None]:
-    """Lock the store, or its part `shard`, and yield the store's accuracy results."""
+    """Lock the store, or its part `shard`, and yield the accuracy results in the store."""
     if folder is None:
         yield None
         return
@@ -106,7 +106,7 @@ def _study_accuracy(
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
     """Return a robot's accuracy result, and whether the result may be stored.
 
-    A failure may be stored if the exception is an `UrdfkinError`. The robot file must be unchanged.
+    A failure may be stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
     """
     import numpy as np
 
@@ -205,23 +205,23 @@ def validate_command(
     cases: bool,
     **options: Any,
 ) -> None:
-    """Compare every frame and joint with Pinocchio, in three reference frames.
+    """Compare every frame and joint with Pinocchio, in all three reference frames, on many samples.
 
     Compared: {compared}. Not compared: {not_compared}. By default, every command checks these quantities when
     it computes them.
 
-    Configurations are random within the joint limits. The command adds the neutral configuration. Two more
-    configurations have all joints at their lower or upper limits. In 4 of 25 samples, velocities and
-    accelerations are a hundred times larger than usual.
+    Configurations are random within the joint limits. The command adds the neutral configuration, and the
+    configurations in which all joints are at their lower or upper limits. In 4 of 25 samples, joint
+    velocities and accelerations are a hundred times larger than in the others.
 
     Disagreements are in multiples of eps * scale. The number eps is 2.2e-16. The number scale is the size of
-    the terms of a value. Rounding alone causes disagreements of 1 to 10.
+    the terms that are added to compute a value. Rounding alone causes disagreements of 1 to 10.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or a folder. In a folder, the command validates all
-    .urdf files. Subfolders are included, except hidden folders.
+    .urdf files, also in subfolders, but not in hidden folders.
 
-    With --store, the same command resumes an interrupted run. `urdfkin report DIR` shows the report at any
-    time.
+    With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
+    any time.
 
     Exit 0: verified. 1: a disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n:
     stopped by signal n; finished results are saved.
@@ -304,7 +304,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _list_urdf_files(robot: str) -> list[str]:
-    """Return `robot`, or all .urdf files below the folder `robot`."""
+    """Return `robot`; if `robot` is a folder, return the .urdf files in it and its subfolders."""
     from urdfkin.urdf.lint.settings import DEFAULT_INCLUDE, Settings, find_files
 
     if not robot or robot in catalogue() or not is_folder(Path(robot)):
@@ -313,9 +313,9 @@ def _list_urdf_files(robot: str) -> list[str]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load the robot from standard input now, because a second read is impossible.
+    """Load the robot now if `source` is standard input, which can be read only once.
 
-    `validate` and the accuracy study lock joints later.
+    The robot has no locked joint, because `validate` and the accuracy study lock the joints.
     """
     from urdfkin.robot.loading import load
 
@@ -324,7 +324,7 @@ def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
-    """Load a USD file now, without locked joints, as in `_load_stdin`."""
+    """Load the robot now if `source` is a USD file; as in `_load_stdin`, no joint is locked."""
     from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}

@@ -96,14 +96,15 @@ def verify_command(
 ) -> Answer:
     """Compare your function or program with urdfkin and Pinocchio, within an error bound.
 
-    TARGET is FILE.py:FUNCTION. For FILE.py, the command checks all functions named after a quantity, such as
-    `jacobian`.
+    TARGET is FILE.py:FUNCTION. If TARGET is FILE.py, the command checks each function of the file that is
+    named after a quantity, for example `jacobian`.
 
-    The arguments of a function are q (nq,), v (nv,) and a (nv,), in rad, m and seconds. A function for a pose
-    or a Jacobian has only the argument q. The function returns an array.
+    The arguments of a function are the arrays q (nq,), v (nv,) and a (nv,), in rad, m and seconds. A function
+    for a pose or a Jacobian has only the argument q. The function returns an array.
 
-    The option --program checks a program in any language. The program reads lines of JSON. The answer to each
-    line is a line {"result": [...]}. The file and the program run with the permissions of your user account.
+    The option --program checks a program in any language. The program reads lines of JSON, and answers each
+    line with a line {"result": [...]}. The file and the program run with the permissions of your user
+    account.
 
     The command uses the zero configuration, the joint limits and random configurations. If a common mistake
     explains wrong results, the command names the mistake. Examples are a missing term, or a wrong frame,
@@ -190,7 +191,7 @@ def _find_quantity(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return FILE.py's FUNCTION, or all functions of FILE.py for a quantity."""
+    """Return the function of FILE.py:FUNCTION, or all functions of FILE.py named after a quantity."""
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(
@@ -226,7 +227,7 @@ def _import_file(path: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # The last folder in `sys.path` hides no installed module.
+    # The folder is at the end of sys.path, so that its files cannot replace installed modules.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

@@ -68,18 +68,19 @@ def view_command(
     convention: str | None,
     browser: bool | None,
 ) -> None:
-    """Show a robot in a browser tab: sliders, shapes, frames, DH frames and arrows.
+    """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
-    The viewer starts at --q. Without --q, the viewer starts at zero, or at the nearest allowed configuration.
-    The viewer shows the chosen frame's position, velocity and other numbers. Pinocchio checks these numbers
-    again after each motion of the robot. The viewer needs the package viser. Ctrl-C stops the viewer.
+    The viewer starts at --q. Without --q, the viewer starts in the configuration nearest to zero that is
+    within the joint limits. The viewer shows the position, velocity and other numbers of the frame that you
+    choose. Pinocchio checks these numbers again after each motion of the robot. The viewer needs the package
+    viser. Ctrl-C stops the viewer.
 
     With --trajectory, the viewer plays the samples of a CSV or .npz file. With --convention, the input field
-    of q is in that convention.
+    of q accepts and shows values in that convention.
 
     The printed address ends with a secret key. Open the whole address, including the key. Show the address
-    only to people who may see and move the robot. Without the key, other web pages and users cannot use the
-    viewer.
+    only to people who may see and move the robot. Without the key, other web pages and other users of the
+    machine cannot use the viewer.
     """
     from urdfkin.view.server import has_screen, new_server, open_page
     from urdfkin.view.viewer import Viewer
@@ -112,7 +113,7 @@ def view_command(
         Viewer(server, loaded, None if start is None else start[0], motion, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        # A pipe transmits the address only after a flush.
+        # If standard output is a pipe, its reader gets the address only after a flush.
         sys.stdout.flush()
         opens = sys.stdout.isatty() and has_screen() if browser is None else browser
         with open_page(server.address) if opens else nullcontext():
@@ -121,8 +122,7 @@ def view_command(
         server.stop()
 
 
-#: Copy of the names in `urdfkin.view.plot`.
-#: An import of `urdfkin.view.plot` would slow `--help` down.
+#: Copy of the names in `urdfkin.view.plot`, because an import of that module would slow `--help` down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -190,13 +190,15 @@ def plot_command(
 ) -> None:
     """Plot a frame's motion along a trajectory.
 
-    The plot has panels for q, v and a with their limits. Further panels show the frame's position, velocity
-    and acceleration. Other panels show the acceleration's parts, the singular values and the check's result.
+    The plot has panels for q, v and a with their limits, and for the frame's position, velocity and
+    acceleration. Other panels show the parts of the acceleration, the singular values, and the result of the
+    check.
 
     The option --trajectory reads a CSV or .npz file. With --to, the robot moves along a straight line in
-    joint space. The robot is at rest at the start and at the end. A floating base moves along a screw. With
-    --convention, the file, --from and --to are in that convention. All panels show the URDF's joint values,
-    in rad and m.
+    joint space, and is at rest at both ends. A floating base moves along a screw.
+
+    With --convention, the file and the values of --from and --to are in that convention. The panels always
+    show the joint values of the URDF, in rad and m.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -230,7 +232,7 @@ def _make_line(
     from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = find_conversion(robot, convention)
-    # Equal seeds would draw the same random start and end.
+    # With equal seeds, a random start and a random end would be the same configuration.
     other_seed = seed + 1 if start.startswith("random") else seed
     first, last = (
         read_inputs(robot, None, own_seed, text, option=option, conversion=conversion).q

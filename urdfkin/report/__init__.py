@@ -1,4 +1,4 @@
-"""Reports of a validation, and their comparison: HTML, JUnit XML, Markdown, terminal text.
+"""Reports of a validation as HTML, JUnit XML, Markdown and terminal text, and the comparison of two reports.
 
-Every report is made from the JSON document. A report can be made later, on another machine.
+Every report is made from the JSON document, so it can also be made later and on another machine.
 """

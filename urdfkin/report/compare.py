@@ -12,12 +12,12 @@ A change is a regression in these cases:
 - A quantity or a table is no longer compared, or not with the second oracle.
 - There are fewer samples or fewer results.
 - A bound is wider, although the robot has the same joints.
-- The worst disagreement grew by more than a given factor, and exceeds 2 eps * scale.
-- The largest ratio (disagreement / bound) grew by more than this factor, and exceeds 0.1.
+- The worst disagreement grew by more than a given factor, and exceeds 2 eps * scale (a single rounding).
+- The largest ratio of a disagreement to its bound grew by more than this factor, and exceeds 0.1.
 - The worst disagreement or the largest ratio is infinite only in the new report.
 
 A changed model is not a regression. The comparison lists changes of a joint's axis, placement, limits and
-mimic rule. A renamed file is not a regression. Robots are matched by the robot name in the file.
+mimic rule. A renamed file is not a regression either: the robot is then found by the robot name in the file.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _DISPLAY_TOLERANCE = Tolerance(1e-9, 1e-9)
 
 
 def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Iterator[tuple[str, str, str]]:
-    """Yield (name, old value, new value) of each change. A missing value is empty."""
+    """Yield the name, the old value and the new value of each change; a missing value is empty."""
     before, after = _joints(old), _joints(new)
     for name in dict.fromkeys([*before, *after]):
         was, now = before.get(name), after.get(name)
@@ -186,13 +186,13 @@ def _units_cell(value: Units | str) -> str:
     return value if isinstance(value, str) else format_units(value)
 
 
-#: A regression: new disagreement > GROWTH_FACTOR * old disagreement.
-#: Other random samples cause smaller growth.
+#: Growth of a robot's largest disagreement or ratio by more than this factor is a regression. Other random
+#: samples cause smaller growth.
 GROWTH_FACTOR = 2.0
-#: New disagreements below DISAGREEMENT_FLOOR eps * scale are no regressions.
-#: A single rounding error can be 2 eps * scale.
+#: Growth is no regression if the new disagreement (in eps * scale) is at most this number. A single rounding
+#: error can be as large as this number.
 DISAGREEMENT_FLOOR = 2.0
-#: New ratios (disagreement / bound) below _BOUND_RATIO_FLOOR are no regressions.
+#: Growth of a ratio of disagreement to bound is no regression if the new ratio is at most this number.
 _BOUND_RATIO_FLOOR = 0.1
 
 
@@ -254,7 +254,7 @@ class ChangeEntry(TypedDict):
 class ComparisonDocument(Header):
     """The output of `urdfkin report compare --format json`.
 
-    The entry `sha256` has the SHA-256 of each robot's text in the new report.
+    The header entry `sha256` contains the SHA-256 of each robot's text in the new report.
     """
 
     changes: Annotated[list[ChangeEntry], doc("All changes between the two reports.")]
@@ -327,9 +327,9 @@ def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
 def find_renamed_files(
     before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
 ) -> dict[str, str]:
-    """Return the new source of each renamed file, by the old source.
+    """Return the new source of each renamed file, with the old source as the key.
 
-    A robot name with one removed and one added source marks a renamed file.
+    A file counts as renamed if its robot name has exactly one removed source and exactly one added source.
     """
     gone, new = _missing_sources_by_name(before, after), _missing_sources_by_name(after, before)
     return {

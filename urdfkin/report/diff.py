@@ -1,4 +1,4 @@
-"""Show changes between two versions of a description: lines, table, Markdown, JSON data."""
+"""Show the changes between two versions of a description as lines, a table, Markdown and JSON data."""
 
 from __future__ import annotations
 

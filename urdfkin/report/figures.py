@@ -1,8 +1,8 @@
 """Histograms of the disagreements with Pinocchio, and the data of the 3D view.
 
 The plot has one row for each quantity, with all reference frames together. The x axis is logarithmic and
-shows the disagreement in eps * scale. A triangle shows the worst result. Results have different bounds. A
-horizontal bar shows the interval of the bounds.
+shows the disagreement in eps * scale. A triangle shows the worst result. Results have different bounds, so a
+horizontal bar shows the interval from the smallest to the largest bound.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: Left end of the x axis, in eps * scale.
-#: A percentage at the left end counts the smaller disagreements.
+#: Left end of the x axis, in eps * scale. The percentage at the left end of a row is the share of smaller
+#: disagreements.
 _X_AXIS_MIN = 1e-2
-#: (Height of the highest bar) / (distance between two rows).
+#: Height of the highest bar, relative to the distance between two rows.
 _BAR_HEIGHT = 0.82
 
 
 def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> str:
-    """Return the plot of one robot as inline SVG. Empty text: nothing was compared."""
+    """Return the plot of one robot as inline SVG, or an empty text if nothing was compared."""
     names = quantities([robot])
     if not names:
         return ""
@@ -81,7 +81,7 @@ def _draw_row(
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _draw_bound_range(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    # A text shows a value beyond the right edge.
+    # If the largest result is outside the plot, a text at the right edge shows its value.
     if largest is None or largest > right:
         text = "✗ not finite" if largest is None else f"✗ {format_units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}

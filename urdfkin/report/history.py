@@ -1,8 +1,8 @@
-"""History of robots in several reports: verdicts, results, findings, changes.
+"""History of robots in several validation reports: verdicts, results, findings and changes from run to run.
 
-Runs are ordered by start time. Robots are matched by source, or by name after a renaming of the file. Each
-report is read twice: for the start time, then for the results. Therefore, few reports are in memory at the
-same time.
+Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed.
+Each report is read twice, first for its start time and then for its results. Therefore, few reports are in
+memory at the same time.
 """
 
 from __future__ import annotations
@@ -34,21 +34,19 @@ from urdfkin.system.files import MAX_BYTES, abbreviate_path, is_folder, read_byt
 from urdfkin.validation.document import OUTCOMES, VALIDATION, BoundRatio, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import package_versions
 
-#: Maximum numbers of reports, and of files in a folder.
+#: Maximum number of reports, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: The list of robots shows the latest MARKED_RUNS verdicts.
-#: The charts show the latest CHARTED_RUNS runs.
+#: The list of robots shows the verdicts of the latest MARKED_RUNS runs. The charts of the page show the
+#: latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: A terminal shows at most MAX_SHOWN runs and MAX_SHOWN changes.
-#: The option `--all` removes the limit on a terminal.
-#: The HTML page's list of changes has at most MAX_SHOWN entries.
+#: Maximum number of runs, and of changes, that a terminal shows without the option `--all`. The list of
+#: changes on the HTML page has at most this number of entries.
 MAX_SHOWN = 20
-#: A robot's section lists at most _MAX_LISTED runs and _MAX_LISTED changes.
+#: Maximum number of runs, and of changes, in the HTML page's section on one robot.
 _MAX_LISTED = 500
-#: Symbol of each verdict on a robot.
-#: The key "" is for a report without the robot.
+#: Symbol of each verdict on a robot. The key "" is for a run whose report does not contain the robot.
 VERDICT_MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the disagreement chart: log10(disagreement / bound).
+#: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _MIN_LOG_RATIO = -3.0
 
 
@@ -121,9 +119,8 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Pairs (index of the run, change), by the robot's source.
-#: The key None is for changes of a whole run.
-#: Such a change is another number of samples.
+#: Changes between runs, as pairs (index of the run, change), by the source of the changed robot. The key None
+#: is for changes of a whole run, for example a change of the number of samples.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -160,7 +157,7 @@ class History:
 def read_history(paths: Sequence[Path]) -> History:
     """Read reports, folders of `validate --store`, and folders that contain reports.
 
-    Raise InputError for no usable report, too many reports or too many files.
+    Raise InputError if no report is usable, or if there are too many reports or files.
     """
     history = History()
     before: Document | None = None
@@ -201,7 +198,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
 
 
 def _reports_in_folder(folder: Path) -> Iterator[Path]:
-    """Yield the reports in a folder, ordered by name. Links to folders are not followed."""
+    """Yield the reports in a folder, ordered by name; links to folders are not followed."""
     seen = 0
     for place, folders, names in os.walk(folder):
         here = Path(place)
@@ -221,7 +218,7 @@ def _reports_in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _reports_in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
-    """Yield reports by start time. Add unusable files and repeated runs to `history`."""
+    """Yield reports by start time, and add unusable files and repeated runs to `history`."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -249,7 +246,7 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _read_start_time(path: Path) -> tuple[float, str]:
-    """Return a report's start time as Unix time (s), and as text. If invalid, the Unix time is infinite."""
+    """Return a report's start time as Unix time in seconds, and as text; an invalid text gives infinity."""
     data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MAX_BYTES), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     moment = utc(text)
@@ -283,7 +280,7 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
 
 
 def _add_robots(history: History, before: Document | None, document: Document) -> None:
-    """Add the robots of the latest run. A renamed file's history continues under the new name.
+    """Add the robots of the latest run; the history of a renamed file continues under the new name.
 
     If the new name already has a history, this history continues.
     """

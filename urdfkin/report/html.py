@@ -1,8 +1,9 @@
 """Reports as HTML pages, and the 3D view in a notebook.
 
-The pages and the view use no network and escape every name. A large report is split. The page has the
-summary; each robot's file has the details. The page loads a robot's file when the reader opens the robot's
-section. The files are scripts. A page from disk can load only scripts.
+The pages and the view use no network and escape every name. A large report is split: the page has the
+summary, and each robot has a file with its details. The page loads a robot's file when the reader opens the
+robot's section. The files are scripts, because a page that is opened from disk cannot load other types of
+files.
 """
 
 from __future__ import annotations
@@ -54,14 +55,14 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
 
-#: Up to _MAX_OPEN_ROBOTS robots, all details are open.
+#: Up to this number of robots, the details of all robots are open at first.
 _MAX_OPEN_ROBOTS = 1
-#: Maximum number of unverified robots with open details.
+#: Maximum number of unverified robots whose details the page shows at first.
 _MAX_OPEN_FAILURES = 20
-#: Above _MAX_DRAWN robots, verified robots have no histograms.
-#: The histograms of one robot take a second of computing time.
+#: If a report has more robots than this number, verified robots have no histograms. The histograms of one
+#: robot take a second of computing time.
 _MAX_DRAWN = 100
-#: Above MAX_PAGE_CHARACTERS, each robot has a separate file.
+#: If the details of all robots have more characters than this number, each robot has a separate file.
 MAX_PAGE_CHARACTERS = 5_000_000
 
 
@@ -106,8 +107,8 @@ def as_html(document: Document) -> str:
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
     """Yield the path and the text of each file.
 
-    Paths are relative to the page, which is the last file. With more than `MAX_PAGE_CHARACTERS` of details,
-    each robot has its own file.
+    Paths are relative to the page, which is the last file. If all details together are longer than
+    `MAX_PAGE_CHARACTERS`, each robot has its own file in a folder.
     """
     document = _worst_first(document)
     robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"
@@ -279,7 +280,7 @@ def format_date(started: str) -> str:
 class NotebookView:
     """The 3D view of `Robot.view` in a notebook.
 
-    `q` (nq,) is the first configuration. `height` is the view's height in pixels.
+    `q` (nq,) is the first configuration, and `height` is the height of the view in pixels.
     """
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
@@ -300,7 +301,7 @@ class NotebookView:
         )
 
     def _repr_html_(self) -> str:
-        # The HTML frame may run scripts but cannot access the notebook.
+        # The HTML frame may run scripts, but it cannot access the notebook.
         return (
             f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
             f' style="width:100%;height:{self._height}px;border:0"></iframe>'

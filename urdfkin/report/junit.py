@@ -1,7 +1,7 @@
 """JUnit XML of a report, and of the checks of `urdfkin verify`.
 
 The XML conforms to junit-10.xsd, the schema of Jenkins. Other programs also accept this schema. The text of
-the element `failure` contains all information. Some programs ignore the element's attributes.
+the element `failure` contains all information, because some programs ignore the attributes of this element.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 
 def as_junit(document: Document) -> bytes:
-    """Return JUnit XML: a suite for each robot, a case for each quantity and reference frame."""
+    """Return JUnit XML with a suite for each robot, and a case for each quantity and reference frame."""
     suites = [_suite(robot, document) for robot in document["robots"]]
     robots = document["robots"]
     if document["interrupted"] or not robots or len(robots) != document.get("robots_requested", len(robots)):

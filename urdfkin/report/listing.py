@@ -1,4 +1,4 @@
-"""Print tables on a terminal of any width. Numbers have six digits."""
+"""Print tables on a terminal of any width; numbers have six digits and are right-aligned."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_document(out: Console, document: TextDocument) -> None:
-    """Print a document. A sentence stays on one line: a reader can copy it."""
+    """Print a document; each sentence stays on one line, so that a reader can copy it."""
     if document.title:
         out.print(document.title, style="bold")
     for part in document.parts:
@@ -30,7 +30,7 @@ def print_document(out: Console, document: TextDocument) -> None:
 def print_table(out: Console, table: Table) -> None:
     """Print a table.
 
-    A name wider than the first column has its own line.
+    If a name in the first column is wider than the column, the name has its own line above the other cells.
     """
     from rich.cells import cell_len
 

@@ -1,4 +1,4 @@
-"""Markdown for a comment on a pull request: verdict, table, failures, commands."""
+"""Markdown for a comment on a pull request: verdict, table, and failures with commands to reproduce them."""
 
 from __future__ import annotations
 
@@ -144,12 +144,12 @@ def table_lines(
 
 
 def count_within(texts: Sequence[str], room: int) -> int:
-    """Return the number of first texts, with line ends, that fit into `room` characters."""
+    """Return how many of the first texts, each with a line end, fit into `room` characters."""
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 
 def fence_code(code: str) -> str:
-    """Return a code block. The fence is longer than any run of backticks inside."""
+    """Return a code block with a fence that is longer than any run of backticks in the code."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
     lines = "\n".join(map(escape_unprintable, code.split("\n")))

@@ -1,4 +1,4 @@
-"""Prepare one robot's results: tables for the terminal, data for the HTML template."""
+"""Prepare one robot's results for display: tables for the terminal, and data for the HTML template."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _DISPLAY_UNITS = DisplayUnits(digits=6)
 
-#: Edges of the heat map's colours, as disagreement / bound.
+#: Ratios of disagreement to bound at which the colour of the heat map changes.
 HEAT_EDGES = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -79,7 +79,7 @@ def overview_row(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -
 
 
 def reason(robot: ReportedRobot) -> str:
-    """Return the reason of the verdict. Errors among the findings are omitted."""
+    """Return the reason of the verdict, without errors that the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -180,7 +180,7 @@ def heat_map(
 
 
 def _columns(model: ReportedModel) -> dict[str, list[int]]:
-    """Return the column indices of each joint, mimic joints included."""
+    """Return the column indices of each joint, for Jacobians in which mimic joints have their own columns."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -202,13 +202,13 @@ def _heat_cell(checks: Sequence[ReportedCheck], subject_indices: dict[str, list[
 
 
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
-    """Return an upper limit of disagreement / bound for one frame, joint or column.
+    """Return an upper limit of the ratio of disagreement to bound, for one frame, joint or column.
 
     The document has bounds only for the whole check. Therefore, the disagreement is divided by the smallest
     bound.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
-    # 0 / 0 counts as 0.
+    # A disagreement of 0 has the ratio 0, even if the bound is 0.
     if not value:
         return math.inf if value is None else 0.0
     if not tightest:

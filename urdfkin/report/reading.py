@@ -1,9 +1,9 @@
 """Read report documents, and check the layout and the consistency of all entries.
 
-Somebody may have edited or truncated a report. This module computes outcome, verdicts, sums and percentiles
-from the other entries. Each ratio must lie between bounds from other entries. The module reports every
-contradiction. The links and joints of a robot must form a tree. Independent joints must have consecutive
-indices in q and v, in joint order.
+A user relies on a report, but somebody may have edited or truncated the file. This module computes the
+outcome, the verdicts, the sums and the percentiles from the other entries. Each ratio must lie between bounds
+that follow from other entries. The module reports every contradiction. The links and joints of a robot must
+form a tree. Independent joints must have consecutive indices in q and v, in the order of the joints.
 """
 
 from __future__ import annotations
@@ -33,12 +33,11 @@ from urdfkin.validation.error_stats import histogram_bin, percentile
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
-#: nq and nv of each kind of joint.
+#: Number of coordinates (nq) and of joint velocities (nv) of each kind of joint.
 _COORDINATE_COUNTS = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(
     _WITH_AXIS, (1, 1)
 )
-#: Tolerance of rotation matrices and unit axes.
-#: A robot file may have only 6 digits.
+#: Tolerance of rotation matrices and unit axes. It is large, because a robot file may have only 6 digits.
 _ROTATION_TOLERANCE = 1e-5
 
 
@@ -51,7 +50,7 @@ def moving_names(model: ReportedModel) -> list[str]:
 
 
 def column_names(model: ReportedModel) -> list[str]:
-    """Return the joint name of each column. Mimic joints have their own columns."""
+    """Return the joint name of each column, for Jacobians in which mimic joints have their own columns."""
     return [joint["name"] for joint in model["joints"] for _ in range(_COORDINATE_COUNTS[joint["kind"]][1])]
 
 
@@ -132,13 +131,12 @@ def _check_coordinate_indices(model: ReportedModel) -> Iterator[str]:
 
 
 _TOLERANCE = 1e-9
-#: Maximum number of results.
-#: A double represents all integers up to 2^53.
+#: Maximum number of results. A double represents all integers up to this number exactly.
 _MAX_RESULTS = 2**53
 
 
 def contradictions(document: Document) -> Iterator[str]:
-    """Yield (location, contradiction) in a document that conforms to the schema."""
+    """Yield the contradictions in a document that conforms to the schema, each with its location."""
     edges, robots = document["histogram_edges"], document["robots"]
     if not edges or any(a >= b for a, b in pairwise(edges)):
         yield "`histogram_edges` are not in ascending order"
@@ -271,14 +269,14 @@ def _check(
 def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `bound_ratio` contradicts the disagreements and bounds.
 
-    `worst` / largest bound <= `bound_ratio` <= `worst` / smallest bound
+    `bound_ratio` must be at least `worst` / largest bound, and at most `worst` / smallest bound.
     """
     ratio, largest = _none_as_infinity(check["bound_ratio"]), _none_as_infinity(check["worst"])
     low, high = _none_as_infinity(check["bound"][0]), _none_as_infinity(check["bound"][1])
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
-        # A check without results has bound[0] > bound[1].
+        # In a check without results, `bound[0]` is larger than `bound[1]`.
         if ratio or largest or check["worst_case"]:
             yield (
                 f"`bound` is {check['bound']}, as in a check without results, but `worst`, `bound_ratio` or"

@@ -1,4 +1,4 @@
-"""Report the comparison of two models: terminal text, Markdown, HTML page."""
+"""Report the comparison of two models: on a terminal, as Markdown and as an HTML page."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ MATCHED_BY_AXES = (
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Printed distances and angles exceed ROUNDING_FACTOR * (rounding bound).
-#: The factor covers the rounding errors of sums.
+#: Distances and angles up to this factor times the bound on rounding errors are not printed. The factor
+#: covers the rounding errors of sums of several terms.
 ROUNDING_FACTOR = 1.001
-#: Heading of a list of mimicked joints.
-#: A listed joint can move its mimic joints beyond their limits.
+#: Heading of a list of mimicked joints. Each listed joint can move a mimic joint beyond the mimic joint's
+#: limits.
 MIMIC_LIMITS_HEADING = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -166,7 +166,7 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 def describe_as_written(sameness: Sameness) -> str:
     """Describe the largest distance between matching frames of A and the unchanged B.
 
-    The text is empty for a rounding error, or if `sameness.after` is empty.
+    The text is empty if rounding errors explain the distance, or if `sameness.after` is empty.
     """
     frame = sameness.as_written
     off = "" if frame is None else _describe_distance(frame, sameness.rounding)
@@ -176,7 +176,7 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text has the nonzero coordinates of A, and of B's unmatched joints.
+    The text contains the nonzero coordinates of model A, and those of unmatched joints of model B.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -205,7 +205,7 @@ def describe_renames(sameness: Sameness) -> list[str]:
 
 
 def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the verdict on two models, with differences and changes."""
+    """Return the verdict on two models, with the changes, differences and distances that explain it."""
     parts: list[str | Table] = [
         f"{k}: {name}" for k, name in zip("AB", _names_with_sources(sameness), strict=True)
     ]
@@ -301,7 +301,7 @@ def as_document(sameness: Sameness) -> TextDocument:
 
 
 def distance_text(frame: Interval) -> str:
-    """Return the distance of two matching frames as text. Distance 0: the angle."""
+    """Return the distance of two matching frames as text, or the angle if the distance is 0."""
     if frame.lower:
         return length(frame.lower)
     return angle(frame.radians_seen) if frame.radians_seen else ""
@@ -351,14 +351,14 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
-#: A picture has the side length 2 * HALF_SIDE (SVG units).
-#: The robots fill FILLED_FRACTION of the side length.
+#: Half the side length of a picture (SVG units), and the fraction of the side length that the drawn robots
+#: fill.
 HALF_SIDE, FILLED_FRACTION = 150.0, 0.9
-#: (Maximum length of the scale bar) / (side length).
+#: Maximum length of the scale bar, relative to the side length of a picture.
 MAX_SCALE_BAR_FRACTION = 0.3
-#: Margin below the scale bar (SVG units).
+#: Distance of the scale bar from the picture's lower edge (SVG units).
 SCALE_BAR_MARGIN = 6.0
-#: Close view: (length of the axes) / (distance of the two frames).
+#: Length of the axes in the close view, relative to the distance between the two frames.
 AXIS_FRACTION = 0.35
 #: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
@@ -413,11 +413,11 @@ def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Seq
 def pictures(
     sameness: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
 ) -> list[dict[str, Any]]:
-    """Draw two views of both skeletons, and a close view of the worst frame.
+    """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    Without `worst`, A is in its zero configuration, B in the matching configuration. With `written`, the base
-    of B has its pose in the file. Otherwise, the base of B has the pose `sameness.base`, nearest to A. A line
-    segment has four numbers: x, y of the start, x, y of the end.
+    Without `worst`, A is in its zero configuration, and B is in the matching configuration. With `written`,
+    the base of B has the pose in the file of B. Otherwise, it has the pose `sameness.base`, which brings B
+    closest to A. A line segment is four numbers: x and y of the start, and x and y of the end.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -450,7 +450,7 @@ def pictures(
 
 
 def _skeleton_lines(robot: Robot, Ts: FloatArray) -> FloatArray:
-    """Return lines (joints, 2, 3) between the origins of parent and child links."""
+    """Return a line for each joint (joints, 2, 3), from the parent link's origin to the child's origin."""
     ends = [(Ts[joint.parent, :3, 3], Ts[i + 1, :3, 3]) for i, joint in enumerate(robot.tree.joints)]
     return np.array(ends).reshape(-1, 2, 3)
 
@@ -469,8 +469,8 @@ def _make_picture(
     gap: FloatArray | None = None,
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
-    # The matrix projects a point into the picture.
-    # In the picture, x points right and y points down.
+    # Matrix that projects a point in space into the picture. In the picture, x points to the right, and y
+    # points down.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

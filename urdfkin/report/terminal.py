@@ -1,7 +1,7 @@
 """Report on a terminal: tables and failures.
 
-A terminal with less than 100 columns shows two tables. A wider terminal shows one. Colours only repeat
-information that the words contain.
+A terminal with less than 100 columns shows two tables; a wider terminal shows one wide table. Colours only
+repeat information that the words contain.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report, with a command for each failure. With `cases`: for each worst result."""
+    """Print a report, with a command that reproduces each failure or, with `cases`, each worst result."""
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio_version(document)}, in eps*scale"
@@ -79,7 +79,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
 
 
 def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
-    """Return robots without checks, by verdict and reason. At least five robots share a reason."""
+    """Return robots without checks by verdict and reason, for reasons that at least five robots share."""
     names: dict[tuple[str, str | None], list[str]] = {}
     for robot in robots:
         if robot["reason"] and not robot["checks"]:

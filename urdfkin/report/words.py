@@ -25,7 +25,7 @@ VERDICTS = tuple(verdict.value for verdict in ValidationVerdict)
 
 
 def utc(started: str) -> datetime | None:
-    """Parse an ISO date and time. Return a `datetime` in UTC, or None for other texts.
+    """Parse an ISO date and time, and return a `datetime` in UTC; return None for any other text.
 
     A time without an offset is in UTC.
     """
@@ -71,7 +71,7 @@ def format_units(value: Units, *, compared: bool = True) -> str:
 
 
 def format_ratio(ratio: Units) -> str:
-    """Format disagreement / bound: as a percentage, or from 10 on like "12 x"."""
+    """Format the ratio of a disagreement to its bound: as a percentage, or from 10 on like "12 x"."""
     if ratio is None:
         return "inf"
     return f"{ratio:.1%}" if ratio < 10.0 else f"{ratio:.2g} x"
@@ -126,7 +126,7 @@ def bound_ratio_cell(robot: ReportedRobot) -> str:
 
 
 def error_cells(line: ReportedAccuracyLine) -> list[str]:
-    """Return four cells: worst errors of urdfkin and Pinocchio, then typical errors."""
+    """Return four cells: the worst errors of urdfkin and of Pinocchio, then their typical errors."""
     both = line["urdfkin"], line["pinocchio"]
     return [*(f"{one['worst']:.2f}" for one in both), *(f"{one['typical']:.3f}" for one in both)]
 

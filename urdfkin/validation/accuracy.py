@@ -1,7 +1,7 @@
-"""Accuracy study: errors relative to values with at least fifty digits.
+"""Accuracy study: errors of urdfkin and of Pinocchio relative to values with at least fifty digits.
 
-Each value with fifty digits is an interval that contains the true value. Therefore, no error is
-underestimated. Errors are multiples of eps * scale, as in a validation report.
+Each value with fifty digits is an interval that contains the true value, so that no error is underestimated.
+Errors are given in multiples of eps * scale, as in a validation report.
 """
 
 from __future__ import annotations
@@ -53,9 +53,8 @@ from urdfkin.verify.verifier import compute_bound, compute_oracle_results, compu
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _as_intervals = np.vectorize(as_interval, otypes=[object])
-#: Representations of the orientation. Keys: `AccuracyLine.reference`.
-#: Angles about fixed axes are Euler angles in reverse order.
-#: Therefore, the study omits angles about fixed axes.
+#: Representations of the orientation, by the attribute `reference` of an `AccuracyLine`. Angles about fixed
+#: axes are omitted, because they are Euler angles in the reverse order.
 _ORIENTATION_REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -100,12 +99,13 @@ class AccuracyStudy:
 def accuracy_study(
     robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None
 ) -> AccuracyStudy:
-    """Compute the errors of urdfkin and Pinocchio, relative to values with fifty digits.
+    """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
-    `base`: one motion of the root link, or one for each sample. Without `base`, the root link is fixed.
+    `base` contains one motion of the root link for all samples, or one motion for each sample. Without
+    `base`, the root link is fixed.
 
-    Pinocchio computes no analytical Jacobians. Therefore, the study evaluates eq. 7.122 with urdfkin's
-    rotation and Jacobian, and with Pinocchio's.
+    Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
+    eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
 
     Raises:
         InputError: The number of motions in `base` is wrong.
@@ -184,7 +184,7 @@ class _AccuracyBatch:
         )
 
     def _compute_analytical_samples(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """Omit Euler angles near a singularity, and quaternions with an uncertain sign."""
+        """Yield samples without Euler angles near a singularity and quaternions with an uncertain sign."""
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, part = self.part.plan, self.part
         magnitudes, min_distance = (
@@ -220,7 +220,7 @@ class _AccuracyBatch:
 
 
 def _find_nonzero_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices (n, links, m) of nonzero columns, by sample and link.
+    """Return the indices (n, links, m) of the nonzero columns for each sample and link.
 
     m is the largest number of nonzero columns. Indices of zero columns fill shorter rows.
     """
@@ -238,10 +238,10 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
     Args:
         R: (m, 3, 3) rotations.
-        near: (m, 4) quaternions. The returned quaternions q satisfy q . near > 0.
+        near: (m, 4) quaternions. They determine the signs of the returned quaternions q: q . near > 0.
     """
     K = davenport_matrix(R)
-    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I = 4 q q^T
+    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I = 4 q q^T, so this sum is parallel to q
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
     return unit
 
@@ -265,7 +265,7 @@ def _make_line(quantity: str, reference: str | None, sample_sets: Sequence[_Accu
 
 @partial(np.vectorize, otypes=[float])
 def _error_bound(x: float, true: Number) -> float:
-    """Return an upper bound on |x - true value|. The interval `true` contains the true value."""
+    """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
     return float(abs(as_interval(true) - x).upper())
 
 

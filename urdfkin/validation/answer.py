@@ -1,11 +1,11 @@
-"""Run a chunk and encode its answer: a result, or the reason of a failure.
+"""Run a chunk, return a result or the reason of a failure, and encode this answer for a file.
 
-After an exception, the answer contains the exception's message. Some exceptions cannot be sent between
-processes. Therefore, an answer is plain data.
+If an exception occurs while a robot is validated, the answer contains the exception's message. An answer is
+plain data, because some exceptions cannot be sent between processes.
 
-A file contains an answer as compressed JSON, the chunk's key and a checksum (sha256). The file may come from
-another machine. Therefore, it contains only data and no code. Damaged, truncated, renamed and foreign files
-are detected before their data are used.
+A file contains an answer as compressed JSON, with the key of the chunk and a checksum (sha256). A file
+contains only data and no code, because the file may come from another machine. Damaged, truncated, renamed
+and foreign files are detected before their data are used.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Failure:
     """The reason why a robot was not checked.
 
     Attributes:
-        is_transient: Whether a resumed run computes the chunk again.
+        is_transient: Whether a resumed run computes the chunk again, for example after a lost answer.
         error: Traceback of an unexpected error.
     """
 
@@ -99,8 +99,7 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
-#: Maximum size of a file's decompressed data.
-#: A larger file counts as damaged.
+#: Maximum size of the data in a file after decompression. A larger file counts as damaged.
 _MAX_UNPACKED_BYTES = 2**27
 
 

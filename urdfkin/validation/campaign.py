@@ -1,4 +1,4 @@
-"""Compare urdfkin's results with Pinocchio's results, and return a report.
+"""Validate robots: compare urdfkin's results with Pinocchio's results, and return a report.
 
 The function `validate` splits the work into chunks. An engine runs the chunks.
 """
@@ -131,7 +131,7 @@ def validate(
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     sources = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
-    pinocchio()  # Raise an error now if Pinocchio is missing.
+    pinocchio()  # If Pinocchio is missing, this call raises an error before the work starts.
     robot_inputs, read_errors = make_robot_inputs(sources, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         robot_inputs = [replace(x, origin=replace(x.origin, oracle=oracle)) for x in robot_inputs]
@@ -154,7 +154,7 @@ def validate(
             if stored_answers is not None:
                 campaign.load_answers(stored_answers)
             for i, error in read_errors.items():
-                # `missing_chunks` ends after the robot's first failure.
+                # After the first failure of a robot, `missing_chunks` yields no further chunk of the robot.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.make_task(i, index), make_failure(robot_inputs[i], error))
             unfinished_inputs = [
@@ -165,7 +165,7 @@ def validate(
             if _should_load_kernels(len(unfinished_inputs) * samples) and (
                 isolate or any(map(_can_be_loaded, unfinished_inputs))
             ):
-                # Loading now keeps compilations out of the robots' computing times.
+                # Load the kernels now, so that no robot's computing time contains a compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
@@ -246,11 +246,10 @@ def _read_studies(
     return tuple(None if isinstance(study, FailedStudy) else study for study in studies), None not in studies
 
 
-#: The number of chunks of all robots must fit in an index of Python.
+#: Maximum number of samples. The number of chunks of all robots must fit in an index of Python.
 _MAX_SAMPLES = 10**15
-#: Numbers of samples above which kernels save time.
-#: Kernels on disk need _WORTH_LOADING samples.
-#: Missing kernels need _WORTH_COMPILING samples.
+#: Numbers of samples of a validation. Above the first number, loading kernels from disk saves time. Above the
+#: second number, compiling missing kernels saves time too.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
@@ -292,9 +291,9 @@ class _Campaign:
 
 
 def chunks_of_shard(robots: int, chunking: Chunking, shard: str | None = None) -> list[range]:
-    """Return each robot's chunks in a shard such as "2/4", or all chunks without a shard.
+    """Return the chunks of each robot in a shard such as "2/4", or all chunks without a shard.
 
-    Shards are contiguous. Therefore, only one shard reads most robots. The numbers of chunks in two shards
+    Shards are contiguous, so that most robots are read by one shard only. The numbers of chunks of two shards
     differ by at most one.
 
     >>> chunks_of_shard(2, Chunking(1000), "1/4"), chunks_of_shard(2, Chunking(1000), "4/4")

@@ -1,8 +1,9 @@
 """Compute chunks of a validation: compare urdfkin with Pinocchio.
 
-A chunk is a range of samples of one robot. A sample depends on robot, seed, number of samples and index.
-Inputs and results of a chunk are plain data. Therefore, a chunk can run in any process, also on another
-machine. Sample 0 is the neutral configuration, 1 the lower limits, 2 the upper limits.
+A chunk is a range of samples of one robot. The robot, the seed, the number of samples and the sample's index
+determine a sample. Inputs and results of a chunk are plain data, so that a chunk can run in any process, also
+on another machine. Samples 0, 1 and 2 of a robot are the neutral configuration, the lower limits and the
+upper limits.
 
 Each group of 25 random samples has its own seed. Therefore, the size of a chunk does not change any result.
 """
@@ -44,11 +45,10 @@ from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
-#: Minimum number of chunks of a robot with 200 samples.
-#: Several workers can share a robot with several chunks.
+#: Minimum number of chunks of a robot with 200 or more samples, so that several workers can share the robot.
 _MIN_CHUNKS = 8
-#: A chunk has at most 40 * DRAW_SIZE = 1000 configurations.
-#: For seven joints, 1000 configurations take about 0.5 s.
+#: Maximum number of groups of `DRAW_SIZE` random configurations in a chunk. Such a chunk has 1000
+#: configurations, which take about 0.5 s for a robot with seven joints.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -149,7 +149,7 @@ class ChunkResult:
 
 @dataclass(frozen=True, slots=True)
 class Chunking:
-    """Division of samples into chunks. It depends only on the number of samples.
+    """Division of each robot's samples into chunks, which depends only on the number of samples.
 
     >>> len(Chunking(1000)), len(Chunking(10_000)), len(Chunking(1_000_000)), len(Chunking(0))
     (8, 10, 1000, 1)
@@ -241,7 +241,7 @@ class _Comparison:
 
 
 class _FrameComparison(_Comparison):
-    """Comparison of a block of frames. A joint belongs to its child link's block."""
+    """Comparison of a block of frames; a joint belongs to the block of its child link."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
@@ -254,17 +254,18 @@ class _FrameComparison(_Comparison):
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.magnitudes = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
-        # A joint and its child link have the same Jacobian.
-        # In `frames`, the links come first, beginning with the root.
+        # A joint and its child link have the same Jacobian. In the list of frames, the links come first,
+        # beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Compare a link's result with Pinocchio's results for link and parent joint.
+        """Compare each link's result with Pinocchio's results for the link and for its parent joint.
 
-        A link and its parent joint have one frame. Pinocchio has different functions for links and joints.
+        A link and its parent joint have the same frame, but Pinocchio has different functions for links and
+        joints.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():
@@ -361,9 +362,8 @@ def _expand_mimic(tree: KinematicTree, free_tree: KinematicTree, q: FloatArray) 
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]
-#: The cache contains only the latest robot.
-#: A worker gets a robot's chunks one after another.
-#: Two large robots would need too much memory.
+#: The cache contains only the latest robot, because two large robots would need too much memory. This is
+#: enough, because a worker gets the chunks of a robot one after another.
 _cache: dict[RobotInput, _Models] = {}
 
 

@@ -38,17 +38,15 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
-#: Maximum number of chunks without an answer:
-#: threads * _CHUNKS_PER_THREAD + _EXTRA_CHUNKS.
-#: Therefore, every thread always has a next chunk.
+#: Maximum number of chunks without an answer: the first number for each thread, plus the second number. Every
+#: thread then always has a next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
-#: A chunk is sent again if Dask loses the worker.
-#: A chunk cannot crash a Dask worker, only a child process.
-#: Therefore, a high number is safe.
+#: Maximum number of times that a chunk is sent. A chunk is sent again if Dask loses the worker. A high number
+#: is safe, because a chunk can crash a child process of a Dask worker, but not the worker itself.
 _MAX_TRIES = 20
-#: Seconds between two readings of the number of workers.
+#: Minimum time (s) between two readings of the number of worker threads.
 _REFRESH_SECONDS = 1.0
-#: These packages must have equal versions here and on the scheduler.
+#: Packages that must have the same version here and on the scheduler, if the scheduler has them.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _EMPTY_ROBOT_INPUT = RobotInput(b"", Origin(""))
 
@@ -117,7 +115,7 @@ def _connect_client(scheduler: str) -> Iterator[Client]:
 
 
 class _WithoutWebServer:
-    """Scheduler or worker without Dask's web pages. Every user of the machine could read the pages."""
+    """Scheduler or worker without Dask's web pages, which every user of the machine could read."""
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
 
@@ -134,8 +132,8 @@ class _LocalWorker(_WithoutWebServer, Worker):
 def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process, without an open port.
 
-    Dask adds its scratch folder to `sys.path`. Another user could place modules there. Therefore, only the
-    current user can access the folder. The function restores `sys.path`.
+    Dask adds its scratch folder to `sys.path`, where another user could place modules. Therefore, only the
+    current user can access the folder, and the function restores `sys.path`.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -172,7 +170,7 @@ def _check_versions(client: Client) -> None:
     for name in _COMPARED_PACKAGES:
         try:
             found = client.run_on_scheduler(metadata.version, name)
-        except Exception:  # The scheduler does not need the package.
+        except Exception:  # The scheduler computes nothing, so it does not need the package.
             continue
         own = package_version(name)
         if own not in (found, "a checkout"):
@@ -202,9 +200,9 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: Sent chunks without an answer: (task, number of tries).
+        #: Sent chunks without an answer: the task, and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: Futures of the texts on the workers, by robot.
+        #: Futures of the texts that the workers store, by robot.
         self._robot_texts: dict[int, Future[bytes]] = {}
         #: Number of sent chunks without an answer, by robot.
         self._pending_counts = Counter[int]()
@@ -260,7 +258,7 @@ class Cluster:
         return future
 
     def _release_robot(self, robot: int) -> None:
-        """Delete the robot's text on the workers, unless a chunk is pending."""
+        """Delete the robot's text on the workers, unless a chunk of the robot is pending."""
         self._pending_counts[robot] -= 1
         if not self._pending_counts[robot]:
             del self._pending_counts[robot]

@@ -1,7 +1,7 @@
-"""Collect the answers of a run, report the progress, and make robots' reports.
+"""Collect the answers of a run, report the progress, and make the report of each robot.
 
-The results of consecutive chunks are stored as one sum, to save memory. The sum does not depend on the order
-of the results.
+The results of consecutive chunks are stored as one sum, to save memory. The error statistics in the sum do
+not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
-        label: Name of the robot of the latest chunk. Before the first chunk: name of the first robot.
+        label: Name of the robot of the latest chunk; before the first chunk, the name of the first robot.
     """
 
     robots_done: int
@@ -152,8 +152,8 @@ class _RobotAnswers:
         return self.chunks_done == len(self.chunks)
 
     def make_report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # A report contains only chunks before the first failed chunk.
-        # Results of later chunks would depend on the workers' speed.
+        # The report contains only results of chunks before the first failed chunk. Otherwise, the report
+        # would depend on the speed of the workers.
         last = min(self.failures, default=self.chunks.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]
@@ -188,7 +188,7 @@ def _decide_verdict(
     samples: int,
     requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
-    """A disagreement takes precedence over a failure."""
+    """Return the verdict and its reasons; a disagreement takes precedence over a failure."""
     disagreements = list(_describe_disagreements(error_stats, summary))
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:

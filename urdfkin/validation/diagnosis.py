@@ -1,13 +1,14 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
-Examples of mistakes are exchanged rows, a wrong frame, and degrees instead of radians. The module applies
-each mistake to urdfkin's results. The changed results are compared with the user's results. Each difference
-is divided by its scale. A mistake explains the whole result under this condition:
+Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
+and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
+results with the user's results. Each difference is divided by its scale. A mistake explains the whole result
+under this condition:
 
 `max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000`
 
-If no mistake explains the whole result, each Jacobian column is searched. The last step combines each mistake
-with exchanged linear and angular rows. At most three mistakes are reported.
+If no mistake explains the whole result, each Jacobian column is searched for a mistake of its own. The last
+step combines each mistake with exchanged linear and angular rows. At most three mistakes are reported.
 """
 
 from __future__ import annotations
@@ -29,19 +30,19 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: Largest `DiagnosisCase.remainder` of a mistake that counts as found.
+#: Largest `DiagnosisCase.remainder` of a mistake that explains the user's results.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_REPORTED = 3
-#: Number of configurations in the first test for exchanged joints.
+#: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
-#: Smallest scale of a difference, relative to the largest scale.
+#: Smallest scale by which a difference is divided, relative to the largest scale.
 _MIN_SCALE = 1e-9
-#: Equal numbers: |difference| <= _EQUALITY_TOLERANCE * scale.
+#: Two numbers count as equal if their difference is at most this number times the scale.
 _EQUALITY_TOLERANCE = 1e-9
 _SWAPPED_HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
-#: Inputs of a function: (q), (q, v) or (q, v, a).
+#: Inputs of a function: q, or q and v, or q, v and a.
 Inputs = tuple[FloatArray, ...]
 
 
@@ -50,9 +51,9 @@ class DiagnosisCase:
     """Results of the user's function (`actual`) and of urdfkin (`expected`).
 
     Attributes:
-        inputs: (q), (q, v) or (q, v, a), in the function's convention.
-        scale: The rounding error of a number is at most k * eps * scale.
-        compute: Returns urdfkin's results for inputs, a frame and a reference frame.
+        inputs: q, or q and v, or q, v and a, in the function's convention.
+        scale: The bound on the rounding error of each number is k * eps * scale.
+        compute: Function that returns urdfkin's results for inputs, a frame and a reference frame.
     """
 
     inputs: Inputs
@@ -115,7 +116,7 @@ def diagnose(mistakes: Mistakes, case: DiagnosisCase) -> list[str]:
     return []
 
 
-#: (description, function that returns results with the mistake)
+#: Description of a mistake, and a function that returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -262,9 +263,9 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, scaled)
 
     def _find_scalar_joints(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, is_angle) of each joint with one coordinate.
+        """Return (name, index in q, index in v, is_angle) of each independent joint with one coordinate.
 
-        Mimic joints are excluded. The indices are those of the function's convention.
+        The indices are those of the function's convention.
         """
         tree = self.robot.tree
         joints = []
@@ -285,7 +286,7 @@ class Mistakes:
     ) -> Inputs:
         """Multiply the entries of some joints by `factor` in the first `count` inputs.
 
-        `indices` contains pairs: index in q, index in v and a.
+        `indices` contains a pair for each joint: the index in q, and the index in v and a.
         """
         scaled = [x.copy() for x in inputs]
         for k, x in enumerate(scaled[:count]):
@@ -365,7 +366,8 @@ class Mistakes:
                     order[[at[1], to[1]]] = order[[to[1], at[1]]]
                 try:
                     predicted = self._compute_with_order(case, first_inputs, order)
-                except UrdfkinError:  # The convention requires another value of a mimic joint.
+                except UrdfkinError:
+                    # In some conventions, a mimic joint has a coordinate, which the exchange makes wrong.
                     continue
                 if case.remainder(predicted, _FIRST_SAMPLES) <= EXPLANATION_TOLERANCE:
                     exchanged = self._exchange_joints(case.inputs, tuple(at), tuple(to))

@@ -1,7 +1,7 @@
-"""Types of a validation's JSON document, and the outcome of a validation.
+"""Types of the JSON document of a validation, and the outcome of a validation run.
 
-The JSON schema is generated from these types. Only this module decides whether a run has passed. This holds
-for new reports and for reports from a file.
+The JSON schema is generated from these types. Only this module decides whether a run has passed, for new
+reports and for reports that are read from a file.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ class ReportedFinding(TypedDict):
 
 
 class ReportedDHRow(TypedDict):
-    """Constant parameters of a Denavit-Hartenberg row, in metres and radians."""
+    """The constant parameters of a row of a Denavit-Hartenberg table, in metres and radians."""
 
     joint: Annotated[str, doc("Name of the joint.")]
     kind: Annotated[Literal["revolute", "continuous", "prismatic"], doc("Kind of the joint.")]
@@ -252,7 +252,7 @@ class ReportedAccuracyLine(TypedDict):
 
 
 class ReportedAccuracy(TypedDict):
-    """Result of the accuracy study: errors relative to values with fifty digits."""
+    """Result of the accuracy study: differences of urdfkin and Pinocchio from values with fifty digits."""
 
     robot: Annotated[str, doc("The robot's name.")]
     samples: Annotated[Count, doc("Number of configurations in the accuracy study.")]
@@ -294,7 +294,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """Number of outliers of each library. The two other libraries agree."""
+    """For each library, the number of results in which it differs from two libraries that agree."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -373,7 +373,7 @@ class ReportedTimings(TypedDict):
 
 
 class ReportedSecondReading(TypedDict):
-    """Comparison of links and joints: urdfkin and yourdfpy read the same text."""
+    """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
     by: Annotated[str, doc("Name and version of the second URDF parser, yourdfpy.")]
     joints: Annotated[Count, doc("Number of compared joints, fixed joints included.")]
@@ -475,7 +475,7 @@ class ValidationVerdict(StrEnum):
 
 
 EXIT_DISAGREES, EXIT_BAD_INPUT, EXIT_NOT_VERIFIED = 1, 2, 3
-#: As in shells: 128 + SIGINT.
+#: Exit code of an interrupted run, as in shells: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
 _VERDICT_WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),

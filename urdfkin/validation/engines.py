@@ -1,12 +1,12 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks, and passes each task's answer to a callback. The collector sorts the answers. Therefore,
-no result depends on the engine or the order of the answers. After a `Failure`, an engine may skip the robot's
-remaining chunks. The engine must run all other chunks. Tasks are created on demand. Therefore, a million
-tasks take little memory.
+An engine runs tasks, and passes the answer of each task to a callback. The collector sorts the answers, so no
+result depends on the engine or the order of the answers. If the answer of a chunk is a `Failure`, an engine
+may skip the remaining chunks of the same robot. The engine must run all other chunks. Tasks are created only
+when they are needed, so a million tasks take little memory.
 
-`WorkQueue` gives different workers different robots. Therefore, only one worker reads most robots. If no
-robot is waiting, a free worker joins another robot. The joined robot's latest chunk has the lowest index.
+`WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker. If
+no robot is waiting, a free worker takes a chunk of the robot whose latest chunk has the lowest index.
 """
 
 from __future__ import annotations
@@ -33,8 +33,7 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: An engine calls the function with a task and its answer.
-#: A task has at most one answer.
+#: Function that an engine calls with a task and its answer. A task has at most one answer.
 AnswerCallback = Callable[[Task, Answer], None]
 
 
@@ -145,7 +144,7 @@ class WorkQueue:
         return None
 
     def next(self, tasks: RobotTasks) -> Task | None:
-        """Return the next task. None: no further task, or the robot was removed."""
+        """Return the next task, or None if no task is left or the robot was removed."""
         task = next(tasks, None)
         if task is None or task.robot in self._removed_robots:
             if tasks in self._started_robots:

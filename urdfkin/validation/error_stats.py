@@ -1,12 +1,12 @@
 """Error statistics of a validation.
 
 The statistics of several chunks, processes and machines can be added. The addition is commutative and
-associative. Therefore, the sum does not depend on the chunks. The worst case of a sum is the worst case of
-its terms.
+associative. Therefore, the sum does not depend on the division of the samples into chunks. The worst case of
+a sum is the worst case of its terms.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
-bound. bound(Pinocchio, second oracle) = sum of the other two bounds. A result is the outlier if only the two
-other results agree.
+bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
+If two results agree and the third result agrees with neither, the third result is the outlier.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, broadcast_k
 from urdfkin.verify.comparison import bound_ratios, worst_disagreements
 
-#: The libraries of a cross check, in column order.
+#: The libraries of a cross check, in the order of columns.
 CROSS_CHECKED_LIBRARIES = ("urdfkin", "pinocchio", "second_oracle")
 
 
@@ -53,7 +53,8 @@ class CrossCheck:
 
     Attributes:
         by: Name of the second oracle.
-        alone: Number of outliers of each library in `CROSS_CHECKED_LIBRARIES`.
+        alone: For each library in `CROSS_CHECKED_LIBRARIES`, the number of results in which only this library
+            differs from the two others.
     """
 
     by: str
@@ -127,7 +128,7 @@ def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
 
 #: Edges of the histogram, in eps * scale: ten bins per decade.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
-#: Key of error statistics: (quantity, reference frame or "").
+#: Key of error statistics: the quantity, and the reference frame ("" if there is none).
 Key = tuple[str, str]
 Inputs = tuple[list[float], list[float], list[float]]
 
@@ -158,10 +159,10 @@ class ErrorStats:
         results: Number of compared matrices or six-vectors.
         worst: The largest disagreement, in eps * scale.
         bound_ratio: The largest ratio of a disagreement to its bound.
-        histogram: (82,) numbers of results in the bins between `HISTOGRAM_EDGES`. The first bin is below all
-            edges, the last bin above all edges.
-        worst_by_frame: Largest disagreement of each frame, in eps * scale.
-        bounds: Smallest and largest bound on a disagreement, in eps * scale.
+        histogram: (82,) numbers of results in bins, which `HISTOGRAM_EDGES` separates. The first bin is below
+            the first edge, and the last bin is above the last edge.
+        worst_by_frame: The largest disagreement of each frame, in eps * scale, in the robot's order.
+        bounds: Smallest and largest bound on a result's disagreement, in eps * scale.
     """
 
     results: int
@@ -202,8 +203,8 @@ def percentile(
 ) -> float:
     """Return the upper edge of the bin that contains a percentile.
 
-    The result is at most `worst`. The first bin has the result 0.0, the last bin the last edge. The error is
-    at most the width of the bin, except in the last bin.
+    The result is at most `worst`. It is 0.0 for the first bin, and the last edge for the last bin. The error
+    is at most the width of the bin, except in the last bin.
     """
     counts = np.cumsum(histogram)
     if not counts[-1]:
@@ -226,8 +227,8 @@ def compute_error_stats(
 ) -> ErrorStats:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    `frames` are the names of the frames, joints or columns. If k of the bound is not finite and positive,
-    every result fails.
+    `frames` are the names of the frames, joints or columns. A result fails if the factor k of its bound is
+    not finite and positive.
     """
     n, count = results.shape[:2]
     if not results.size:

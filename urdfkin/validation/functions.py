@@ -1,8 +1,9 @@
 """Compare a user's function with urdfkin and the oracle.
 
-The user's function computes a quantity from (q), (q, v) or (q, v, a). The configurations are random, zero and
-at the joint limits. The allowed difference is a derived bound on rounding errors. The error is in the
-function if urdfkin and the oracle agree.
+The user's function computes a quantity from q, from q and v, or from q, v and a. The function is called at
+random configurations, at the zero configuration and at the joint limits. The allowed difference is a derived
+bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with urdfkin, the error
+is in the function.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from urdfkin.verify.call import Call
 
 _BATCH_SIZE = 256
-#: More samples do not fit in memory.
+#: Maximum number of random configurations, because more do not fit in memory.
 _MAX_SAMPLES = 10**9
 _DIAGNOSIS_SAMPLES = 48
 _MAX_MESSAGES = 5
@@ -72,8 +73,8 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: The function's inputs: q, or q and v, or q, v and a.
-        bound: Allowed difference of each number: (rounding bound) * `FunctionCheck.factor`.
-        replay: Command or line of Python for the expected result.
+        bound: Allowed difference of each number: the bound on rounding errors times `FunctionCheck.factor`.
+        replay: A command or a line of Python that computes the expected result.
     """
 
     sample: int
@@ -271,8 +272,8 @@ def verify_function(
     The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
     quantities, and v (nv,) and a (nv,) for some quantities. Without `convention`, the units are rad, m and s.
     The values are random within the limits; the zero configuration and the joint limits come first. In every
-    eighth sample, v and a are a hundred times larger. Quadratic terms then have a visible effect. Exceptions
-    and wrong shapes are reported, and do not end the check.
+    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect.
+    Exceptions and wrong shapes are reported, and do not end the check.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -355,10 +356,10 @@ class _FunctionResults:
         first: Index of the batch's first configuration in the whole check.
         inputs: Inputs of the whole batch, in the function's convention.
         valid_indices: (n,) indices in the batch.
-        actual: (n, ...), from the user's function.
-        expected: (n, ...), from urdfkin.
-        scale: (n, ...). The allowed difference is k * eps * scale.
-        k: (n,), `FunctionCheck.factor` included.
+        actual: (n, ...) results of the user's function.
+        expected: (n, ...) results of urdfkin.
+        scale: (n, ...) scales of the results. The allowed difference is k * eps * scale.
+        k: (n,) factors of the bounds, multiplied by `FunctionCheck.factor`.
     """
 
     first: int
@@ -551,10 +552,10 @@ class _Run:
         return converted
 
     def _compute_conversion_k(self, q: FloatArray) -> float:
-        """Return k. The conversion's rounding error is at most k * eps * scale.
+        """Return the factor k; the rounding error of the conversion is at most k * eps * scale.
 
-        Reordering has no rounding errors. A conversion of angles, such as radians to degrees, has these
-        errors:
+        Reordering has no rounding errors. A conversion of angles, for example from radians to degrees, has
+        these errors:
 
         - The error of an angle and of its rotation matrix is at most 2 eps |q|.
         - The error of a vector is at most the sum of the errors of all rotation matrices.
@@ -700,7 +701,10 @@ def _try_call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Return a copy of the result, or None after an error. The function may reuse its arrays."""
+    """Return a copy of the result, or None after an error.
+
+    The result is copied, because the function may reuse its arrays.
+    """
     try:
         result = function(*inputs)
         if result is None:

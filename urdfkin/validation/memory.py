@@ -1,12 +1,12 @@
-"""Limit the memory of a validation, and estimate a robot's memory.
+"""Limit the memory of a validation, and estimate the memory that a robot needs.
 
-Frames are compared in blocks, to limit the memory. The largest arrays are Jacobians: samples * frames * 6 *
-nv numbers. A frame's results do not depend on the other frames. Therefore, the size of the blocks does not
-change the report.
+Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
+samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
+results do not depend on the other frames.
 
-Each of n local processes may use 1 / (2 n) of the initially free memory. A process of an executor may use
-half of its machine's free memory. A robot that needs more memory is not verified. Its report states the
-needed and the allowed memory.
+Each of n local processes may use 1 / (2 n) of the memory that is free at the start. A process of an executor
+may use half of the free memory of its machine. If a robot needs more memory than one process may use,
+the robot is not verified. Its report states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MAX_BLOCK_BYTES = 32 * 2**20
 _FREE_FRACTION = 0.5
 #: Measured memory of Pinocchio 4.1.0. Its workspace is proportional to nv^3.
 _BYTES_PER_NV_CUBED, _BYTES_PER_LINK = 64, 24_000
-#: Maximum number of blocks of results in memory.
+#: Maximum number of arrays in memory at the same time. Each array contains the results of a block of frames.
 _MAX_ARRAYS = 12
 _PROC = Path("/proc")
 _CGROUPS = Path("/sys/fs/cgroup")
@@ -73,7 +73,7 @@ def check(tree: KinematicTree, samples: int, allowed_bytes: int | None) -> None:
 
 
 def _find_free_bytes() -> Iterator[int]:
-    """Yield the free memory (bytes) under each limit: machine, control group, RLIMIT_AS."""
+    """Yield the free memory (bytes) under each limit: of the machine, of control groups, and RLIMIT_AS."""
     for line in _read_lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
@@ -103,8 +103,7 @@ def _find_group_free_bytes(mount: Path, group: str, limit: str, usage: str) -> I
         numbers = [line for file in (limit, usage) for line in _read_lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _read_lines(place / "memory.stat"))
-            # Linux counts cached files as used memory.
-            # Linux frees the memory of inactive cached files on demand.
+            # Linux counts cached files as used memory, but frees inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 

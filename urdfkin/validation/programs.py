@@ -1,4 +1,4 @@
-"""Compute a quantity with an external program. Requests and answers are lines of JSON.
+"""Compute a quantity with an external program in any language; requests and answers are lines of JSON.
 
 Each request is one line on the program's standard input:
 
@@ -7,16 +7,16 @@ Each request is one line on the program's standard input:
      "q": [...], "v": [...], "a": [...]}
 
 `coordinates` contains the names of the numbers in q. The entries `v` and `a` are present if the quantity
-needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock`,
-`root_joint` and `convention` exist if the user gave values. `lock` contains the values of locked joints.
-`mimic` is false if each mimic joint has its own coordinate, as with --no-mimic. The URDF file does not
-contain the values of locked joints or the root joint. The answer is one line:
+needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock` (values
+of locked joints), `root_joint` and `convention` are present if the user gave them. The entry `mimic` is
+present, with the value false, if each mimic joint has its own coordinate, as with --no-mimic. The URDF file
+contains neither the values of locked joints nor the root joint. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
-The program runs with the rights of the user who starts it. The program may hang, end or give an invalid
-answer. Then the call raises `ProgramError` and stops the program. The next call starts the program again.
-After three consecutive failures, the program is not started again. An answer with the entry `error` raises
+The program runs with the rights of the user who starts it. If the program hangs, ends or gives an invalid
+answer, the call raises `ProgramError` and stops the program. The next call starts the program again. After
+three consecutive failures, the program is not started again. An answer with the entry `error` raises
 `ProgramError`, but does not stop the program.
 """
 
@@ -42,12 +42,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum length of a program's error text in a message.
-#: Unit: characters of an entry `error`, bytes of standard error.
+#: Maximum length of a program's error text in a message. The length is in characters for an entry `error`,
+#: and in bytes for the program's standard error.
 _MAX_ERROR_LENGTH = 300
-#: After this number of consecutive failures, the program stays stopped.
+#: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
-#: One day, s.
+#: Maximum time limit for an answer: one day, in seconds.
 _MAX_TIMEOUT = 86400.0
 
 
@@ -158,7 +158,7 @@ class Program:
             answer = self._parse_answer(self._request_answer(request.encode()))
         except ProgramError:
             self._failures += 1
-            self._stop()  # A late answer would be the next request's answer.
+            self._stop()  # A delayed answer would be read as the next request's answer.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):
@@ -192,7 +192,7 @@ class Program:
                 stream.close()
 
     def _request_answer(self, request: bytes) -> bytes:
-        """Write and read at the same time. A program may answer before it has read the request."""
+        """Write and read at the same time, because a program may answer before it has read the request."""
         process = self._process
         assert process is not None
         assert process.stdin is not None

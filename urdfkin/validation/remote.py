@@ -1,9 +1,10 @@
 """Functions that run on the machines of a cluster.
 
-Dask's worker computes nothing. The worker runs chunks in child processes. A robot can crash a child process,
-but not the worker. After a crash, the worker runs the chunk again in a new process. After a second crash, the
-robot is "not verified". The reason is the signal or exit status. Chunks and answers are transferred as bytes.
-A chunk does not contain the text of the robot. The text is sent separately, and not again with every chunk.
+Dask's worker computes nothing. It runs chunks in child processes, so that a robot can crash a child process,
+but not the worker. If a chunk crashes a process, the worker runs the chunk again in a new process. If the new
+process crashes too, the robot is not verified; the reason is the signal or exit status. Chunks and answers
+are transferred as bytes. A chunk does not contain the text of the robot. The text is sent separately, so that
+it is not sent again with every chunk.
 """
 
 from __future__ import annotations
@@ -20,10 +21,9 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Outcome of a chunk, and data.
-#: "answer": The data are the pickled answer.
-#: "died": The data are the second crash's signal or exit status.
-#: "other code": The data are the worker's versions and digests.
+#: Outcome of a chunk, and data. "answer": The data are the pickled answer. "died": The data are the signal or
+#: exit status of the second crash. "other code": The data are the worker's versions and digests, which differ
+#: from the client's.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -43,7 +43,7 @@ def store_robot(robot: bytes) -> bytes:
 
 
 def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
-    """Run a pickled chunk in a worker process. After a crash, try a new process.
+    """Run a pickled chunk in a worker process; after a crash, try a new process.
 
     The chunk is not run if the client has other versions or digests.
     """

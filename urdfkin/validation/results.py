@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 
 
 _PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
-#: Packages that display results, but compute no results.
-#: A campaign can resume after a change of these packages.
+#: Packages that display results, but compute no results. A campaign can resume if only the code of these
+#: packages has changed.
 _DISPLAY_PACKAGES = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Return library versions, and digests of equations and code. `_DISPLAY_PACKAGES` are excluded."""
+    """Return library versions, and digests of the equations and of the code that can affect results."""
     equations = hashlib.sha256(read_bytes(_PACKAGE_FOLDER / "kinematics" / "equations.py")).hexdigest()
     return {name: package_version(name) for name in LIBRARIES} | {
         "code": _digest_code(),
@@ -99,13 +99,12 @@ class RobotReport:
         return [stats for (kind, _), stats in self.error_stats.items() if kind == quantity]
 
     def replay(self, key: Key) -> str | None:
-        """Return a command for the worst result. None: nothing was compared."""
+        """Return a command that computes the worst result again; None if nothing was compared."""
         quantity, reference = key
         if (case := self.error_stats[key].case) is None:
             return None
         row = QUANTITIES[quantity]
-        # A link and a joint may have equal names.
-        # Therefore, a joint needs the prefix "joint:".
+        # A joint needs the prefix "joint:", because a link may have the same name.
         frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return format_replay_command(
@@ -171,9 +170,9 @@ class ValidationReport(Displayable):
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        library_versions: Package versions of the run. None: the installed versions.
-        studies: Accuracy results, one for each compared robot. Empty if no study was requested. None: the
-            robot's study failed or is missing.
+        library_versions: Package versions of the run; None for the installed versions.
+        studies: Results of the accuracy study, one for each compared robot. Empty if no study was requested.
+            The result of a robot is None if its study failed or is missing.
     """
 
     robots: tuple[RobotReport, ...]

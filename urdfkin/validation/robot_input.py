@@ -1,7 +1,8 @@
 """The robots to validate, as plain data.
 
-`origin` and the digest of the text identify a robot. A path represents a robot's file, so thousands of robots
-take little memory. `RobotInput.load_text` raises InputError if the file has changed.
+`origin` and the digest of the text identify a robot. A robot's file is represented by its path, so that
+thousands of robots take little memory. `RobotInput.load_text` raises InputError if the file has changed since
+the start of the validation.
 """
 
 from __future__ import annotations
@@ -44,9 +45,9 @@ class RobotInput:
     """A robot to validate, as plain data.
 
     Attributes:
-        source: Path, catalogue name or URDF text, as for `load`.
-        sha256: The sha256 of the robot's text; empty for an unreadable text.
-        file: File name in errors and warnings, if `source` is a text.
+        source: A path, a catalogue name or the text of the URDF, as for `load`.
+        sha256: The sha256 of the robot's text; empty if the text cannot be read.
+        file: The file name in errors and warnings, if `source` is the text of the robot.
         source_findings: Errors and warnings about the original MJCF or USD file.
     """
 
@@ -102,7 +103,7 @@ class RobotInput:
                 lock=dict(self.origin.lock),
                 source_findings=self.source_findings,
             )
-        robot.verifier.origin = self.origin  # The origin names the text's file.
+        robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
         return robot
 
     def load(self) -> Robot:
@@ -185,14 +186,14 @@ def _make_robot_input(
     source = unambiguous_path(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
         return _from_path_or_name(source, mimic, root_joint)
-    text = read_source(cast("Source", source))  # Open files can be read only once.
+    text = read_source(cast("Source", source))  # An open file, or standard input, can be read only once.
     if is_mjcf(text.data):
         return _make_robot_input(text.data, mimic, root_joint, None)
     return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 
 def _is_object(robot: RobotSource) -> bool:
-    """Return whether `robot` is another library's object, a table, or in robot_descriptions."""
+    """Return whether `robot` is an object of another library, a table, or a name of robot_descriptions."""
     if isinstance(robot, str | bytes | os.PathLike) or hasattr(robot, "read"):
         return find_description(robot) is not None
     return True

@@ -1,11 +1,11 @@
 """Summary of a robot for the validation report.
 
-`urdfkin info --format json` prints only the result of `describe`. The summary has links, joints, findings,
-Denavit-Hartenberg tables, and a comparison with yourdfpy. The summary is plain data for other processes and
-for JSON.
+`urdfkin info --format json` prints only the result of `describe`. The summary has the links and joints, the
+findings in the file, Denavit-Hartenberg tables, and a comparison with yourdfpy. The summary is plain data,
+which can be sent between processes and written as JSON.
 
-The chains of a catalogue robot are its limbs in the catalogue. Other robots' chains are the paths from the
-base to the leaves. Paths with the same moving joints are one chain.
+The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
+from the base to the leaves. If several paths have the same moving joints, only one of them is a chain.
 """
 
 from __future__ import annotations
@@ -81,9 +81,10 @@ def _describe_joint(robot: Robot, i: int, reductions: dict[str, RangeReduction])
 
 
 def _remaining_range(reduction: RangeReduction | None) -> dict[str, Any] | None:
-    """Return a mimicked joint's range within the limits of its mimic joints.
+    """Return the range of a mimicked joint within the limits of its mimic joints.
 
-    None: the joint's whole range. The ends are None if the limits allow at most one value.
+    The result is None if the joint keeps its whole range. The ends are None if the limits allow at most one
+    value.
     """
     if reduction is None:
         return None
@@ -150,7 +151,7 @@ def _describe_tables(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTa
 
 @dataclass(frozen=True, slots=True)
 class RobotSummary:
-    """Summary of a robot in a report. `model` is None for an unreadable robot."""
+    """Summary of a robot in a report; `model` is None if the robot could not be read."""
 
     model: ReportedModel | None = None
     findings: tuple[FindingEntry, ...] = ()

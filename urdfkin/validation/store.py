@@ -10,12 +10,13 @@
     DIR/.writing/                  unfinished files
     DIR/damaged/                   damaged and unknown files
 
-The manifest defines robots, samples, versions, chunks and chunk keys. A key is the sha256 of all data that
-determine the chunk's numbers. Therefore, results of older code, texts or options are never reused.
+The manifest defines the robots, the samples, the seed, the versions, the chunks and the key of each chunk.
+The key is the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts
+or options are never reused.
 
-Files are written atomically: a file is complete or absent. A file's name contains the key of its chunk. The
-store reports damaged files, and files of no known chunk. A writable store moves these files to the folder
-`damaged/`. The results in a damaged file are computed again.
+Files are written atomically, so a file is either complete or absent. A file's name contains the key of its
+chunk. The store reports damaged files, and files that belong to no chunk of the validation. A writable store
+moves these files to the folder `damaged/`. The results in a damaged file are computed again.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ class Manifest:
 
     Attributes:
         started: Start time, ISO 8601, UTC.
-        robots: Origin and sha256 of each robot. An unreadable text has an empty sha256.
+        robots: Origin and sha256 of each robot; the sha256 of an unreadable text is empty.
     """
 
     robots: tuple[tuple[Origin, str], ...]
@@ -161,7 +162,7 @@ class Store:
     """A folder that contains the results of a validation.
 
     Attributes:
-        scratch: Folder for unfinished files; None: the store is read-only.
+        scratch: Folder for unfinished files; None if the store is read-only.
     """
 
     folder: Path
@@ -214,9 +215,10 @@ class Store:
                 self._path_of(self.manifest.key(robot, index), _FAILED).unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files with unknown names. A writable store moves them to `damaged/`.
+        """Report files with unknown names; a writable store moves them to `damaged/`.
 
-        Results of the accuracy study are not checked. Their names depend on settings outside the manifest.
+        Results of the accuracy study are not checked, because their names depend on settings outside the
+        manifest.
         """
         keys = (
             self.manifest.key(robot, index)
@@ -229,7 +231,7 @@ class Store:
                 self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
     def count_chunks(self) -> dict[int, tuple[int, bool]]:
-        """Return (number of chunks with a result, whether a chunk failed) for each robot."""
+        """Return the number of chunks with a result, and whether a chunk failed, for each robot."""
         names = {path.name for kind in (_DONE, _FAILED) for path in self._find_files(kind)}
         counts = {}
         for robot in range(len(self.manifest.robots)):
@@ -270,7 +272,7 @@ class Store:
     def writing_process(self) -> str | None:
         """Return a process that writes to the store, or None.
 
-        The processes of shards share the store's lock. Each process also locks its shard's file.
+        The processes of shards share the store's lock, and each process also locks the file of its shard.
         """
         for path in (self.folder / _LOCK, *sorted(self.folder.glob(f"{_LOCK}-*"))):
             try:
@@ -339,8 +341,8 @@ def open_store(
     | "2/4" | shared lock of the store, exclusive lock of the shard |
     | None | exclusive lock of the store |
 
-    `retry` contains chunks of each robot. The stored failures of these chunks are deleted. The robots' files
-    may differ now. Failures of other chunks belong to other shards, and remain.
+    `retry` contains chunks of each robot. The stored failures of these chunks are deleted, because the
+    robots' files may have changed. Failures of other chunks belong to other shards, and remain.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -399,7 +401,7 @@ def _check_or_write_manifest(store: Store, retry: Sequence[range] | None) -> Sto
     if retry is not None:
         whole = range(len(store.manifest.chunking))
         robots = zip(before.manifest.robots, store.manifest.robots, retry, strict=True)
-        # A changed file's failures are outdated, in every shard.
+        # All failures of a changed file are outdated, also those of other shards.
         before.delete_failures([chunks if old == new else whole for old, new, chunks in robots])
     if is_changed:
         store.write(_MANIFEST, store.manifest.as_json())
@@ -431,7 +433,7 @@ def _hold_lock(folder: Path, shard: str | None) -> Iterator[None]:
 
 
 def _open_lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """Refuse links, pipes and devices."""
+    """Open a lock file; raise SourceError for a link, a pipe or a device."""
     message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -449,7 +451,7 @@ def _acquire_lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_LOCK_ATTEMPTS):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # `Store.writing_process` also holds the lock for a moment.
+        time.sleep(0.1)  # `Store.writing_process` of another process can also hold the lock for a moment.
     raise InputError(
         "another process uses this store",
         where=str(folder),
@@ -485,7 +487,7 @@ class FailedStudy:
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study. `moving_base`: the root link has a random motion in each sample."""
+    """Settings of the accuracy study; with `moving_base`, the root link moves at random in each sample."""
 
     samples: int
     seed: int

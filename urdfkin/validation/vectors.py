@@ -1,10 +1,11 @@
-"""Write test vectors: configurations of a robot, and their correct results.
+"""Write test vectors: configurations of a robot, and the results that a correct program computes for them.
 
 The results are computed with at least 50 digits, and written with 17 digits. Each number has a tolerance.
-Test vectors name the robot's URDF file and the file's SHA-256. For a robot outside the catalogue, the URDF
+Test vectors name the robot's URDF file and the file's SHA-256. If the robot is not in the catalogue, its URDF
 file is written too. The file `robots/features.toml` defines small robots, each with one feature of URDF.
-Results are computed from the decimals in the URDF. Configurations are computed from SHA-256 digests of names
-and indices. Therefore, the vectors depend only on the URDF and the robot's name.
+Results are computed from the decimal numbers in the URDF. Configurations are computed from SHA-256 digests of
+the robot's name, the names of joints, and indices. Therefore, the vectors depend only on the URDF and the
+robot's name.
 """
 
 from __future__ import annotations
@@ -56,26 +57,21 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: A program for version 1.0 can read all versions 1.x.
+#: A program that reads version 1.0 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
-#: Number of configurations of each robot.
-#: The first configuration is the zero configuration.
-#: Outside the limits, the nearest limit replaces zero.
+#: Number of configurations of each robot. In the first configuration, joints are at 0, or at the nearest
+#: limit if the limits exclude 0.
 SAMPLES = 3
-#: Largest absolute value of random v and a.
-#: Random q of planar and floating joints have the same limit.
-#: Quaternions have no such limit.
+#: Largest absolute value of random v and a. The same limit holds for random q of planar and floating joints,
+#: except quaternions.
 _MAX_RANDOM = 2.0
-#: Inputs are multiples of 1 / _STEPS_PER_UNIT.
-#: Exceptions are quaternions and values at a joint limit.
-#: Multiples of 1 / 1024 have at most ten decimals.
-#: A double represents these multiples without rounding.
+#: Inputs are rounded to multiples of 1 / 1024, except quaternions and values at a joint limit. These
+#: multiples have at most ten decimals, and a double represents them without rounding.
 _STEPS_PER_UNIT = 1024.0
-#: Significant digits of the tolerance k * eps * scale.
-#: First, the tolerance is rounded to the nearest 12 digits.
-#: The removed digits differ between processors.
-#: Then, the tolerance is rounded upward to 3 digits.
+#: Numbers of significant digits of the tolerance k * eps * scale. The tolerance is first rounded to the
+#: nearest number with 12 digits, because the further digits differ between processors. The tolerance is then
+#: rounded upward to 3 digits.
 _TOLERANCE_DIGITS, _FIRST_TOLERANCE_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -83,9 +79,8 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: Spatial acceleration = classical acceleration - w x v.
-#: ACCELERATION's bound includes the error of w x v.
-#: Therefore, the two accelerations have the same bound.
+#: The spatial acceleration is the classical acceleration minus w x v. The bound of ACCELERATION includes the
+#: error of w x v. Therefore, spatial and classical acceleration have the same bound.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -250,7 +245,7 @@ def make_configuration(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q, v and a of a sample.
 
-    The numbers depend only on the sample's index and the robot's name, joints and limits.
+    The numbers depend only on the sample's index, and on the robot's name, joints and limits.
     """
     q, ranges = neutral(tree), coordinate_ranges(tree)
     for joint, start in zip(tree.joints, tree.q_index, strict=True):
@@ -336,7 +331,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
     """Write the test vectors of the robot's default tip.
 
-    For a robot outside the catalogue, the function also writes the URDF.
+    If the robot is not in the catalogue, the function also writes the URDF.
     """
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
@@ -436,7 +431,7 @@ def _compute_results(
 ) -> Iterator[dict[str, Any]]:
     """Compute results with intervals of `digits` digits.
 
-    `value` has None for an interval too wide for `format_decimal`.
+    An entry of `value` is None if its interval is too wide for `format_decimal`.
     """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:

@@ -1,12 +1,12 @@
 """Engine that runs chunks in processes of this machine.
 
-A crash of a process affects only the process's robot. A worker process is a new Python interpreter. A worker
-does not import the parent's main module. Therefore, a script needs no `__main__` guard. A worker has one
-chunk at a time. A crash therefore belongs to one robot.
+The crash of a process affects only the robot that this process validates. A worker process is a new Python
+interpreter. A worker does not import the parent's main module, so a script needs no `__main__` guard. A
+worker has one chunk at a time, so each crash can be attributed to a robot.
 
-After a crash, the same chunk and the robot's remaining chunks wait for all other robots. Then they run in a
-separate process. After a second crash, the robot is not verified. With `isolate`, each robot has a separate
-process from the start. After one crash, the robot is not verified.
+If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
+separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
+a separate process from the start, and is reported as not verified after the first crash.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, WorkQueue
 
 WORKER_MODULE = "urdfkin.validation.worker_processes"
-#: Time limit for a crashed worker's exit status, s.
+#: Maximum time to wait for the exit status of a crashed worker, in seconds.
 _EXIT_TIMEOUT = 5.0
 
 
@@ -50,7 +50,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Without this copy, the pipe closes when the worker ends.
+            # Close this copy of the worker's end, so that the pipe closes when the worker ends.
             theirs.close()
 
     @property
@@ -138,8 +138,8 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    With `crash_reason`, each process validates one robot. `crash_reason` is the reason in the report of a
-    crash. Without `crash_reason`, a process can validate several robots.
+    With `crash_reason`, each process validates one robot, and a crash is reported with this reason. Without
+    `crash_reason`, a process can validate several robots.
     """
 
     def __init__(
@@ -178,8 +178,7 @@ class _WorkerPool:
                     self._workers.append(worker)
             except Exception as error:
                 if self._workers:
-                    # The system allows no new process.
-                    # An existing worker process takes the task later.
+                    # No new process can be started, so an existing worker process takes the task later.
                     self._queue.put_back(task, tasks)
                     return
                 self._record_answer(task, make_lost_failure("no process could be started", error))

@@ -1,4 +1,4 @@
-"""Draw a chain's Denavit-Hartenberg frames, joint axes and common normals as SVG.
+"""Draw a chain with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
 
 The picture is an orthographic view. Joint axes are dashed lines along z. Offsets d are grey and lie on the
 joint axes. Lengths a are orange and lie on the common normals. The module needs the extra
@@ -23,7 +23,7 @@ from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, styl
 
 _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
-#: Direction of view in the base frame, rad.
+#: Direction of view: elevation and azimuth in the base frame, rad.
 _ELEVATION, _AZIMUTH = math.radians(20.0), math.radians(-55.0)
 
 
@@ -65,7 +65,7 @@ def _projection() -> FloatArray:
 class _Canvas:
     """A two-dimensional drawing of points and directions in the base frame.
 
-    `size` (m) is the chain's largest extent along an axis of the base.
+    `size` (m) is the largest extent of the chain along an axis of the base.
     """
 
     axes: Any
@@ -90,10 +90,7 @@ class _Canvas:
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def draw_labels(self) -> None:
-        """Join labels of equal colour at nearly equal points.
-
-        Other close labels move sideways.
-        """
+        """Join labels of one colour at about the same point, and move other close labels sideways."""
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for point, along, text, color in self.labels:
             for other, _, texts, other_color in merged:
@@ -114,8 +111,8 @@ class _Canvas:
             look = {"color": color, "ha": "center", "va": "center", "zorder": 6}
             # The background keeps a label legible on lines.
             look["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
-            # Labels of axes are formulas, such as $x_1$.
-            # Names are plain text, because names may contain "$".
+            # Labels of x and z axes are formulas, such as $x_1$. Names of joints and frames are plain text,
+            # because names may contain "$".
             self.axes.text(*position, ", ".join(texts), parse_math=color in (_X, _Z), **look)
 
 
@@ -126,7 +123,7 @@ def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
     """
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
-        # Standard convention: the offset d comes before the length a.
+        # In the standard convention, the offset d comes before the length a.
         if table.convention is DHConvention.STANDARD:
             x, z = frames[i + 1, :3, 0], frames[i + 1, :3, 2]
             normal = math.cos(row.beta) * x + math.sin(row.beta) * z

@@ -1,7 +1,7 @@
 """Make figures with matplotlib, as files or inline SVG.
 
-The module needs the extra `urdfkin[plots]`, but no display. Inline SVG uses the colours of the page's style.
-One drawing therefore fits light pages, dark pages and print.
+The module needs the extra `urdfkin[plots]`, but no display. Inline SVG uses the colours of the page's style,
+so that one drawing fits light pages, dark pages and print.
 """
 
 from __future__ import annotations
@@ -38,12 +38,11 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours.
-#: Distinguishable with red-green or blue-yellow colour blindness.
+#: Okabe and Ito's colours: readers with red-green or blue-yellow colour blindness can distinguish them.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of crosses: disagreement beyond bound, coordinate beyond limits.
+#: Colour of the crosses for disagreements above the bound and for coordinates outside the limits.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {
@@ -75,10 +74,7 @@ def style(**more: Any) -> Any:
 
 
 def label(name: str) -> str:
-    """Escape unprintable characters in a name.
-
-    XML forbids some of these characters.
-    """
+    """Escape unprintable characters in a name, because XML forbids some of them."""
     return escape_unprintable(name)
 
 
@@ -119,7 +115,7 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
     with style():
         figure.savefig(stream, format="svg", metadata=no_metadata, transparent=True)
     text = stream.getvalue()
-    # Remove style elements: they would affect the whole page.
+    # A style element would affect the whole page, so it is removed.
     text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = _with_ids(text, prefix)
     for placeholder, colour in PAGE_COLOURS.items():

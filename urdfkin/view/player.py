@@ -1,7 +1,7 @@
 """Play a trajectory in the viewer, and save pictures (PNG) and motions (GIF).
 
-Pinocchio checks the samples of the trajectory. The viewer does not interpolate between samples. Interpolated
-numbers would be unchecked.
+Pinocchio checks the samples of the trajectory. The viewer does not interpolate between samples, because
+interpolated numbers would be unchecked.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from urdfkin.view.plot import check_summary
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
-#: Saved motion: frames per second, maximum number of frame intervals.
-#: `_SIZE` is (width, height) in pixels.
+#: Number of frames per second and maximum number of frame intervals of a saved motion, and its size (width,
+#: height) in pixels.
 _FRAME_RATE, _MAX_INTERVALS, _SIZE = 12.5, 250, (640, 480)
 
 
 class Screen(Protocol):
     """The attributes and methods of a `Viewer` that a `Player` uses.
 
-    The module of `Viewer` imports this module. This module therefore cannot import `Viewer`.
+    This module cannot import `Viewer`, because the module of `Viewer` imports this module.
     """
 
     server: Any

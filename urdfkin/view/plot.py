@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: A panel draws one diagram, for example the frame's velocity.
-#: Arguments: matplotlib's Axes, the motion, the times (s).
+#: A panel draws one diagram, for example the frame's velocity. Its arguments are matplotlib's Axes, the
+#: motion and the times (s).
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
 #: The dashes of seven lines. The first six lines are distinguishable without colours.
@@ -64,10 +64,7 @@ def _make_xyz_panel(vector: Callable[[FrameMotion], FloatArray], label: str) -> 
 
 
 def _rotation_vectors(x: FrameMotion) -> FloatArray:
-    """Return rotation vectors (n, 3), rad, in world axes.
-
-    A vector is the frame's rotation since the first sample.
-    """
+    """Return the frame's rotation since the first sample, as rotation vectors (n, 3) in world axes (rad)."""
     R = x.placement[:, :3, :3]
     return log_rotation(R @ R[0].T)
 
@@ -89,7 +86,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    # Fewer than two powers of ten: draw three ticks.
+    # If the vertical axis has fewer than two powers of ten, the axis gets three ticks between its ends.
     if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -113,8 +110,8 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.bound_ratio > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # Bounds are about a hundred times the usual disagreement.
-    # So the axis is logarithmic above 1 eps * scale.
+    # Bounds are about a hundred times the usual disagreement, so the vertical axis is logarithmic. The axis
+    # is linear between 0 and 1 eps * scale.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -135,10 +132,10 @@ PANELS: dict[str, Panel] = {
     "disagreement": draw_disagreement,
 }
 
-#: Suffix of the unit "rad" or "m".
+#: Suffix of the unit "rad" or "m" for q, v and a.
 _UNIT_SUFFIX = {"q": "", "v": "/s", "a": "/s²"}
-#: "q", "v" and "a" select the panels of coordinates.
-#: Angles, lengths and quaternions have separate panels.
+#: "q", "v" and "a" select panels of the robot's coordinates. Angles, lengths and quaternions have separate
+#: panels.
 COORDINATE_PANELS = tuple(_UNIT_SUFFIX)
 
 
@@ -165,8 +162,8 @@ def _draw_coordinates(
 ) -> None:
     """Draw the coordinates in `indices` that change during the trajectory.
 
-    If no coordinate changes, draw all. If there are more than `_MOST_NAMES`, coordinates that stay within the
-    limits are grey.
+    If no coordinate changes, all coordinates are drawn. If more than 14 coordinates are drawn, coordinates
+    that are always within their limits are grey.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
@@ -198,7 +195,7 @@ def _draw_coordinates(
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
     """Return whether each value is outside the coordinate's limits.
 
-    A limit's decimal notation may be rounded. The double next to a limit therefore counts as inside.
+    The double next to a limit counts as inside, because the limit's decimal notation may be rounded.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -211,14 +208,13 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-#: Width and maximum height of a figure, in inches.
-#: A figure fits on A4 and US Letter.
+#: Width and maximum height of a figure, in inches. This size fits on A4 and US Letter with a margin.
 _PAGE_SIZE = (7.6, 10.4)
-#: Heights in inches: a panel; title and footer together.
+#: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
-#: Letters per inch: footer; legend with the font size 6.
+#: Numbers of letters per inch in the footer, and in a legend with the font size 6.
 _LETTERS_PER_INCH, _LEGEND_LETTERS_PER_INCH = 16, 22
-#: Width of a legend entry without its name, in letters.
+#: Width of a legend entry without its name (the line sample and the gaps), in letters.
 _HANDLE_LETTERS = 8
 _DERIVATIVES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
@@ -226,7 +222,7 @@ _DERIVATIVES_UNCHECKED = (
 
 
 def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """Return a figure with the named panels; by default, with all panels.
+    """Return a figure with the named panels, or with all panels if no name is given.
 
     `PANELS` and `COORDINATE_PANELS` contain the names.
     """
@@ -289,7 +285,7 @@ def _endpoints_text(x: FrameMotion, trajectory: Trajectory) -> str:
 
 
 def check_summary(x: FrameMotion, trajectory: Trajectory) -> str:
-    """Return one line: the check's result and the source of v and a."""
+    """Return one line with the result of the check, and with the source of v and a."""
     rates = f"rates {trajectory.rates_source}" + (
         ", exactly" if trajectory.exact else f"; {_DERIVATIVES_UNCHECKED}"
     )

@@ -1,7 +1,4 @@
-"""Read the visual shapes of a URDF for the viewer.
-
-The library trimesh loads mesh files.
-"""
+"""Read the visual shapes of a URDF's links for the viewer, and load mesh files with trimesh."""
 
 from __future__ import annotations
 
@@ -25,7 +22,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Maximum size of a mesh, material or texture file, bytes.
+#: Maximum size (bytes) of a mesh, material or texture file that the viewer shows.
 LARGEST_FILE = 200_000_000
 
 
@@ -34,10 +31,7 @@ def _load_mesh(file: Path) -> Any:
     import trimesh
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
-        """Finds materials and textures in the mesh's folder or a subfolder.
-
-        Other files, and files that are not regular, are not found.
-        """
+        """Finds only materials and textures that are regular files in the mesh's folder or a subfolder."""
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -52,7 +46,7 @@ def _load_mesh(file: Path) -> Any:
 
 
 def make_mesh(shape: Shape) -> Any | None:
-    """Return a shape's mesh as a coloured trimesh.Trimesh in the link's frame.
+    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame.
 
     Return None if the shape has no readable mesh file with faces.
     """
@@ -75,9 +69,9 @@ def make_mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape.
+    """Return the corners (8, 3) of a box around a shape, in the link's frame.
 
-    The corners are in the link's frame. A mesh must be readable.
+    The file of a mesh must be readable.
     """
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
@@ -121,9 +115,9 @@ class Shape:
 def shapes(robot: Robot) -> list[Shape]:
     """Return the visuals of a robot.
 
-    Malformed visuals and unknown geometries, such as a capsule, are missing.
+    Malformed visuals, and visuals with an unknown geometry such as a capsule, are left out.
     """
-    root = parse_xml(robot.urdf)  # A loaded robot's URDF is already checked.
+    root = parse_xml(robot.urdf)  # The URDF of a loaded robot is already checked.
     urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []
@@ -199,11 +193,9 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
 
 
 def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
-    """Return the mesh file at an address in a URDF.
+    """Return the path of the mesh file at an address in a URDF; None if there is no such file.
 
-    Return None if there is no such file.
-
-    A relative path is relative to the folder of the URDF.
+    A relative path in the URDF is relative to the folder of the URDF.
     """
     candidates = list(_candidates(address, urdf_file))
     try:
@@ -216,7 +208,7 @@ def _candidates(address: str, urdf_file: Path | None) -> Iterator[Path]:
     if not address or "\0" in address:
         return
     if (parts := split_uri(address)) is not None:
-        # Some URDFs have a third slash: package:///NAME.
+        # Some URDFs have a third slash before the package's name: package:///NAME.
         name, path = parts if parts[0] else parts[1].partition("/")[::2]
         package = find_package(name, urdf_file)
         if package is not None:

@@ -1,7 +1,7 @@
-"""Start viser's web server with a request filter, and open the viewer's page.
+"""Start viser's web server, refuse requests without the viewer's key, and open the viewer's page.
 
-Every page in the user's browser can reach a web server on 127.0.0.1. Every user of the machine can also reach
-the server. Four independent measures protect the viewer:
+A web server on 127.0.0.1 can be reached by every page in the user's browser and by every user of the machine.
+Four independent measures protect the viewer:
 
 | measure | protects against |
 |---|---|
@@ -10,14 +10,15 @@ the server. Four independent measures protect the viewer:
 | a check of the **Origin** header | another page that opens a WebSocket, which browsers allow |
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
-Viser checks neither the Host header nor the Origin header. Viser has no option for these checks. To start the
+Viser checks neither the Host header nor the Origin header, and has no option for these checks. To start the
 web server, viser calls `websockets.asyncio.server.serve`. While the server starts, this module replaces
-`serve`. The replacement adds a check of each request. Before the viewer shows a robot, this module sends
-forbidden requests to the server. If the server accepts a forbidden request, `new_server` stops the server. A
-new version of viser can therefore make the viewer fail. The viewer cannot become insecure.
+`serve` by a function that adds a check of each request. To test the checks, this module sends forbidden
+requests to the running server before the viewer shows a robot. If the server accepts a forbidden request,
+`new_server` stops the server. A new version of viser can therefore make the viewer fail, but not make the
+viewer insecure.
 
-Every user of the machine can read the command line of the browser. This line therefore does not contain the
-address of the viewer. The browser opens a file in a private folder. The file redirects the browser to the
+Every user of the machine can read the command line of the browser, so this line does not contain the address
+of the viewer. The browser opens a file in a private folder, and this file redirects the browser to the
 address.
 """
 
@@ -50,7 +51,7 @@ from urdfkin.system.locks import make_fork_safe_lock
 
 
 def has_screen() -> bool:
-    """Return whether this process can show a browser on a screen."""
+    """Return whether the user has a screen on which this process can show a browser."""
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
@@ -69,9 +70,8 @@ def open_page(address: str) -> Iterator[None]:
 
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
-#: Headers of every response.
-#: Forbidden: caching, guessing the content type, embedding the page.
-#: The address contains the key, so browsers send no Referer.
+#: Headers of every response. The headers forbid caching, guessing the content type, and embedding the page.
+#: Browsers must not send the page's address as Referer, because the address contains the key.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -87,7 +87,7 @@ class RequestFilter:
     """Accepts or refuses requests.
 
     Attributes:
-        host: The address from the user, at which the server listens.
+        host: The address at which the server listens, as the user gave it.
         key: The key, which must be the whole path of every request.
     """
 
@@ -95,7 +95,7 @@ class RequestFilter:
     key: str
 
     def refusal(self, path: str, hosts: list[str], origins: list[str], *, connects: bool) -> str | None:
-        """Return the reason for a refusal, or None if the request is allowed.
+        """Return the reason why a request is refused, or None if the request is allowed.
 
         `hosts` and `origins` are the values of all Host and Origin headers. `connects` is True if the request
         opens a WebSocket. A request for a WebSocket must have an Origin header.
@@ -121,8 +121,8 @@ class RequestFilter:
     def _is_known(self, host: str) -> bool:
         """Return whether the filter accepts the host in a Host header.
 
-        An attacker can make foreign host names resolve to this machine. An IP address cannot be redirected.
-        The user may forward a port to the server, so the header may have any port.
+        An attacker can make foreign host names resolve to this machine, but cannot redirect an IP address.
+        The header may have any port, because the user may forward a port to the server.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -150,9 +150,9 @@ class RequestFilter:
 def policy(nonce: str, host: str) -> str:
     """Return the Content-Security-Policy header of the viewer's page.
 
-    The browser runs only scripts with the nonce. The nonce is random for each page. A name in a URDF
-    therefore cannot inject a script. The page can connect only to this server. The parameter `?websocket=` of
-    a link cannot select another server.
+    The browser runs only scripts with the nonce. The nonce is random for each page, so a name in a URDF
+    cannot inject a script. The page can connect only to this server, even if a link names another server with
+    the parameter `?websocket=`.
     """
     return "; ".join(
         [
@@ -172,23 +172,22 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The server handles only this message: a control has changed.
-#: The page's connection also handles other messages (camera, ...).
+#: The only message from a page that viser's server handles: a control has changed. The connection of each
+#: page also handles other messages, for example about the camera.
 _ACCEPTED_MESSAGES = ("GuiUpdateMessage",)
-#: Two replacements in viser's page.
-#: The first replacement adds the nonce to viser's script.
-#: The second replacement is for script elements that viser creates.
+#: Two replacements in viser's page. The first replacement adds the nonce to viser's script. The second
+#: replacement adds the nonce to a script element that viser's script creates.
 _NONCE_REPLACEMENTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: urdfkin's style and script follow this start of the head.
+#: urdfkin adds its style and script after this start of the page's head.
 _HEAD_START = '<meta charset="utf-8" />'
 _serve_lock = make_fork_safe_lock()
 
 
 class UnguardedError(UrdfkinError, RuntimeError):
-    """The viewer does not start: urdfkin cannot secure the installed viser."""
+    """This version of urdfkin cannot secure the installed viser, so the viewer does not start."""
 
     def __init__(self, what: str) -> None:
         super().__init__(
@@ -232,10 +231,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
 
 def _require_usable_address(host: str) -> None:
-    """Raise InputError for an unusable address.
-
-    With such an address, viser would search for a free port forever.
-    """
+    """Raise InputError for an unusable address, because viser would search for a free port forever."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):
@@ -277,7 +273,7 @@ def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> C
 
 
 def _page() -> Callable[[str], bytes]:
-    """Return a function from a nonce to viser's page (HTML) with this nonce."""
+    """Return a function that takes a nonce and returns viser's page (HTML) with this nonce."""
     import viser
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
@@ -327,8 +323,8 @@ def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[Non
 def _remove_message_handlers(server: Any) -> None:
     """Remove the handlers of viser's server, except for `_ACCEPTED_MESSAGES`.
 
-    Examples of removed handlers are sharing, uploads and commands. Each page's connection keeps its own
-    handlers. These handlers affect only this page. urdfkin creates no control for a single page.
+    For example, the handlers for sharing, uploads and commands are removed. Each page's connection keeps its
+    own handlers, which affect only this page. urdfkin creates no control for a single page.
     """
     try:
         websocket_server = server._websock_server
@@ -344,7 +340,7 @@ def _remove_message_handlers(server: Any) -> None:
 
 
 def _test_filter(requests: RequestFilter, port: int) -> None:
-    """Raise UnguardedError if the server refuses its page or accepts a foreign request."""
+    """Raise UnguardedError if the running server does not return its page, or accepts a foreign request."""
     host = requests.address(port).split("/")[2]
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
     websocket = here | {

@@ -1,8 +1,8 @@
-"""Draw a robot, arrows, the velocity ellipsoid and Denavit-Hartenberg frames in viser's scene.
+"""Draw a robot in viser's scene, with arrows, the velocity ellipsoid and Denavit-Hartenberg frames.
 
-- Let one joint velocity be 1 and all others 0. The frame's velocity is then a column of the Jacobian (7.85).
-- Let the vector of joint velocities have the length 1. The frame's velocity vector then ends inside an
-  ellipsoid or on its surface. The axes of the ellipsoid are the left singular vectors of the Jacobian. The
+- A column of the Jacobian is the frame's velocity if one joint velocity is 1 and all others are 0 (7.85).
+- For joint velocities of length 1, the frame's velocity vector ends inside an ellipsoid or on the ellipsoid's
+  surface. The axes of the ellipsoid are the left singular vectors of the Jacobian, and the
   half-lengths are the singular values.
 - The acceleration is the sum of transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
 """
@@ -34,13 +34,13 @@ PART_COLOURS = {
     "sum": (30, 30, 30),
 }
 LINEAR_COLOUR, ANGULAR_COLOUR = (0, 114, 178), (204, 121, 167)
-#: Length of the longest arrow / size of the robot.
+#: Length of the longest arrow, as a fraction of the robot's size.
 _ARROW_FRACTION = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Arrows in the world: points (n, 2, 3), m, and colours (n, 3), 0 to 255."""
+    """Arrows in the world: points (n, 2, 3) in metres, and colours (n, 3) from 0 to 255."""
 
     points: FloatArray
     colours: np.ndarray
@@ -49,7 +49,7 @@ class Arrows:
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """An ellipsoid in the world: half-lengths and centre (3,), m, and quaternion wxyz."""
+    """An ellipsoid in the world: half-lengths and centre (3,) in metres, and a quaternion wxyz."""
 
     half: FloatArray
     centre: FloatArray
@@ -57,7 +57,7 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """Return an arrow for the linear or angular part of each Jacobian column.
+    """Return an arrow for the linear or angular part of each column of the Jacobian.
 
     `x` has one sample, in LOCAL_WORLD_ALIGNED. A part with a norm of at most 1e-9 has no arrow.
     """
@@ -95,9 +95,7 @@ def _arrows(
 
 
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
-    """Return the ellipsoid of frame velocities, scaled for the scene.
-
-    The vector of joint velocities has the length 1.
+    """Return the ellipsoid of the frame's velocities for joint velocities of norm 1, scaled for the scene.
 
     `x` has one sample, in LOCAL_WORLD_ALIGNED. `reach` is the robot's size (m). The largest half-length is
     0.3 `reach`, unless the Jacobian is 0.
@@ -113,11 +111,11 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
 
 
 def quaternions_scalar_first(R: FloatArray) -> FloatArray:
-    """Convert rotations (..., 3, 3) to viser's quaternions (..., 4): w, x, y, z."""
+    """Convert rotation matrices (..., 3, 3) to quaternions (..., 4) in viser's order w, x, y, z."""
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum time until a page's layout is final, s.
+#: Maximum time until a page has its final layout, in seconds.
 _LAYOUT_TIME = 15.0
 _CAMERA_DIRECTION = np.array([1.1, -1.3, 0.6])
 #: Fraction of the view that the robot fills.
@@ -127,7 +125,7 @@ _FOV = np.deg2rad(75.0)
 
 
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
-    """Return the camera's position and target point, (3,) each, m.
+    """Return the position of the camera and the point at which the camera looks, both (3,) in m.
 
     All `points` (n, 3) are in the picture, with a margin. `fov` is the vertical field of view (rad), and
     `aspect` is width / height.
@@ -190,9 +188,7 @@ class Stage:
         server.on_client_connect(self._set_first_camera)
 
     def set_initial_camera(self, Ts: FloatArray) -> None:
-        """Set the first camera of new pages.
-
-        The robot is visible in n configurations.
+        """Set the first camera of new pages, so that the robot is visible in n configurations.
 
         `Ts` (n, links, 4, 4) contains the placements of the links.
         """
@@ -205,7 +201,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._points_in_view, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the visual shapes. Return whether missing shapes require a skeleton."""
+        """Add the visual shapes, and return whether the skeleton must be shown because shapes are missing."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -280,10 +276,7 @@ class Stage:
             self._set_camera(client)
 
     def _set_first_camera(self, client: Any) -> None:
-        """Set the camera of a new page.
-
-        The panel can make the view narrower. The camera is then set again.
-        """
+        """Set the camera of a new page, and set it again if the panel makes the view narrower."""
         begin, last_aspect = time.monotonic(), 0.0
 
         def update_camera(_: Any) -> None:

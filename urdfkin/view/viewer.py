@@ -1,4 +1,4 @@
-"""The viewer: a robot in a browser tab, beside sliders and checked numbers."""
+"""Define the viewer: a robot in a browser tab, beside a panel with sliders and checked numbers."""
 
 from __future__ import annotations
 
@@ -39,18 +39,17 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Unlimited: joint ranges from this size, rad or m.
-#: Unlimited: velocity limits from this size, rad/s or m/s.
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited.
 _UNLIMITED_RANGE = 100.0
-#: Step of a slider for angles and derivatives of angles.
-#: An arrow key changes the angle by one step.
+#: Step of a slider for an angle or a derivative of an angle, in degrees and in radians. An arrow key changes
+#: the value by one step.
 _STEP_DEGREES, _STEP_RADIANS = 1.0, 0.01
-#: Minimum number of slider steps for lengths and their derivatives.
-#: The step is 10^n, 2 * 10^n or 5 * 10^n.
+#: Minimum number of steps of a slider for a length or a derivative of a length. The slider's step is 1, 2 or
+#: 5 times a power of ten.
 _MIN_STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Maximum of a velocity slider without limit, rad/s or m/s.
-#: Maximum of an acceleration slider, rad/s^2 or m/s^2.
+#: Largest joint velocity (rad/s, m/s) of a slider if the joint has no velocity limit. Largest joint
+#: acceleration (rad/s^2, m/s^2) of a slider.
 _VELOCITY, _ACCELERATION = 3.0, 5.0
 #: Maximum number of missing meshes that a message names.
 _MOST_MISSING = 5
@@ -68,11 +67,10 @@ class SliderRow:
 
 
 class Sliders:
-    """A group of sliders, for example for all joint velocities.
+    """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    The text `unit_suffix` follows the unit: "" for q, "/s" for v, "/s²" for a. If the user moves a slider,
-    `on_change` receives the index and the new number. If the program sets a slider, `on_change` is not
-    called.
+    The text `unit_suffix` follows the unit: "" for q, "/s" for v, "/s²" for a. `on_change` receives the index
+    and the new number when the user moves a slider, but not when the program sets a slider.
     """
 
     def __init__(
@@ -125,8 +123,7 @@ class Sliders:
         if self._is_setting:
             return
         scale = self._scale(row)
-        # The browser rounds values.
-        # A value can therefore exceed the end of the slider.
+        # The browser rounds a value at an end of the slider, so the value can be beyond this end.
         lower, upper = (
             limit if end == scale * limit else end / scale
             for end, limit in ((handle.min, row.lower), (handle.max, row.upper))
@@ -145,8 +142,8 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # The conversion to degrees could change a value's last digits.
-                # So an unchanged value is not set again.
+                # An unchanged value is not set again, because the conversion to degrees could change its last
+                # digits.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -173,9 +170,9 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[SliderRow]:
-    """Return a slider for each coordinate that can change, except quaternions.
+    """Return the data of a slider for each coordinate that can change, except quaternions.
 
-    The range without limits is -pi to pi rad, or -1 to 1 m.
+    For a coordinate without limits, the range is from -pi to pi rad, or from -1 to 1 m.
     """
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
@@ -220,10 +217,7 @@ def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def format_values(values: FloatArray) -> str:
-    """Return numbers as text without loss of digits.
-
-    `--q` and `set_q` can read the text.
-    """
+    """Return numbers as text without loss of digits, in a form that `--q` and `set_q` read."""
     return ",".join(repr(float(value)) for value in values)
 
 
@@ -467,7 +461,7 @@ class Viewer:
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
-            # The text field keeps the user's text.
+            # The text field keeps the text that the user typed.
             self.wrong.content = markdown_text("; ".join(degrees_messages(self.robot.tree, self.q)))
             self.sliders.show(self.q)
             self.update()
@@ -478,10 +472,7 @@ class Viewer:
                 sliders.build(values, degrees=self.units.value == "degrees")
 
     def _update_convention(self) -> None:
-        """Make shapes transparent while a table is shown.
-
-        The frames of the table are inside the shapes.
-        """
+        """Make shapes transparent while a table is shown, because frames of the table are inside shapes."""
         with self._lock:
             shown = self.dh.value != "none"
             if self.shapes.value == (SOLID if shown else SEE_THROUGH):
@@ -497,7 +488,7 @@ class Viewer:
                     words = f"{self._table.base_frame} to {self._table.tip_frame}"
                 except UrdfkinError as error:
                     words = str(error)
-            # Viser would load images even in Markdown code: escape all.
+            # Viser would load images even inside Markdown code, so all characters are escaped.
             self.dh_words.content = markdown_text(words)
             self.update()
             if self.player is not None:
