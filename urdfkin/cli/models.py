@@ -118,9 +118,9 @@ def same_command(
     robots` lists, or Denavit-Hartenberg tables.
 
     A and B are the same robot if the screws of all joints and the zero-configuration poses of all links
-    agree. Fixed links, names and the order of joints may differ. A and B are equivalent if some changes of B
-    make B the same robot as A. For example, B may need another base pose, or another zero position of a
-    joint.
+    agree. Fixed links, names and the order of joints may differ. Masses and shapes are not compared;
+    `urdfkin diff` lists their changes. A and B are equivalent if some changes of B make B the same robot as
+    A. For example, B may need another base pose, or another zero position of a joint.
 
     If A and B differ, the command compares each frame of B with the same frame of A. For the largest distance
     between the two frames, the command prints a lower and an upper bound. The command also prints a

@@ -153,8 +153,8 @@ def _format_samples(
 
 
 _ROBOT_HELP = (
-    "ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path may lead to a"
-    " Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
+    "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The path may also lead to"
+    " a Denavit-Hartenberg table: .toml, .json, .csv, .tsv, .md, .tex or .txt."
 )
 _breakdown_option = click.option(
     "--breakdown",
