@@ -63,7 +63,8 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general_identification`.
 _GENERAL_CONFIGURATIONS = 40
-#: A warning is given if `Fit.noise_ratio` differs from 1 by more than this number of standard deviations.
+#: If the noise is stated, a warning is given if `Fit.noise_ratio` differs from 1 by more than this number of
+#: standard deviations.
 _NOISE_RATIO_SIGMAS = 4.0
 #: A parameter is poorly observable if its ratio of uncertainties (`Calibration.poorly_observable`) exceeds
 #: this number.

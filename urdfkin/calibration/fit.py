@@ -93,7 +93,8 @@ from urdfkin.verify.singular_values import singular_values
 _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
-#: The text "same effect as ..." names only parameters with at least this fraction of the total effect.
+#: The text "same effect as ..." names only parameters with more than this fraction of the fixed parameter's
+#: effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -212,7 +213,8 @@ _EIGENVALUE_CUTOFF = 1e-9
 _MAX_NOISE_ESTIMATES = 20
 #: The noise estimation ends when the relative change of the estimated noise is at most this number.
 _NOISE_CONVERGENCE = 1e-3
-#: Probability that urdfkin reports at least one outlier in a data set without outliers.
+#: Probability that urdfkin reports at least one outlier in a data set without outliers. The number is also
+#: the significance level for additional identifiable parameters.
 FALSE_ALARM = 0.01
 #: A parameter's change is significant if it exceeds this number of standard deviations.
 SIGMAS = 2.0
@@ -295,7 +297,7 @@ class Fit:
 
     @property
     def noise_ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct.
+        """The ratio of the noise in the residuals to the stated noise; about 1 if the stated noise is true.
 
         The ratio is nan if `has_redundancy` is false.
         """

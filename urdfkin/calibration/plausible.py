@@ -62,9 +62,9 @@ _JOINT_VALUE_RESOLUTION = 1e-6
 #: This number of standard deviations is subtracted from a parameter's change before the limit is applied.
 #: Therefore, an uncertain change does not make a fit implausible.
 _CHANGE_MARGIN_SIGMAS = 5.0
-#: Without objections to the fit, a correction must reduce the error to at most this fraction.
+#: An accepted correction has at most this multiple of the original error.
 _MAX_IMPROVED_ERROR_RATIO = 0.25
-#: If there are objections or zero positions that changed by half a turn, this larger fraction is allowed.
+#: This multiple applies if the original fit is not plausible, or changes a zero position by half a turn.
 _MAX_SIMILAR_ERROR_RATIO = 1.5
 #: Maximum number of corrections for which all parameters are fitted. The corrections with the smallest errors
 #: before this fit are chosen.

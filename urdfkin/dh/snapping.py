@@ -38,8 +38,8 @@ from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
-#: Largest permitted tolerance, rad. Below 7.5 degrees, at most one multiple of 15 degrees is within the
-#: tolerance of an angle.
+#: Largest permitted tolerance, rad. With a tolerance below 7.5 degrees, at most one multiple of 15 degrees is
+#: near enough to an angle.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Samples of a mimicked joint that is not on the path are in this range (rad or metres).

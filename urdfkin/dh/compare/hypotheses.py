@@ -36,7 +36,7 @@ _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
 #: Cost of each difference from the interpretation that the file states, as a fraction of the smallest shape
-#: difference of all candidates.
+#: difference of all candidates. The tolerance is added to this cost.
 _DIFFERENCE_COST_RATIO = 0.1
 #: A better interpretation has a tip error within the tolerance. A larger tip error suffices if it is at most
 #: this fraction of the reach, and of the tip error of the stated interpretation.
