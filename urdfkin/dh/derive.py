@@ -218,7 +218,7 @@ def _shift_to_previous_origin(constants: list[FloatArray], k: int) -> None:
 
 
 def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """`offset` is a vector in the frame of joint k."""
+    """Shift the frame of joint k by `offset`, a vector (m) in this frame."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 

@@ -461,7 +461,7 @@ def _unescape(name: str) -> str:
 
 
 def _nest_row(row: dict[str, Any], units: Mapping[str, str | None], where: str) -> dict[str, Any]:
-    """Without a mimic rule, add the offset to theta or d."""
+    """Nest the entries of a mimic rule and of limits; without a mimic rule, add the offset to theta or d."""
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("mimicked_joint", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
@@ -641,7 +641,7 @@ def suggest_published_tables(robot: str) -> list[str]:
 
 
 def reference_path(name: str) -> Path:
-    """`name` is a path or a published table's name."""
+    """Return the path of a table; `name` is a path or the name of a published table."""
     path, files = Path(name), published_tables()
     if not name:
         raise SourceError("the path is empty", remedy=f"give a file, or one of {', '.join(files)}")

@@ -170,7 +170,7 @@ def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Mimic joints move independently."""
+    """Return `count` joint values and the tip's poses; mimic joints move independently."""
     travels = _prismatic_ranges(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = sample_uniform(ranges, count, seed)
@@ -312,7 +312,7 @@ def _find_differences_without_fit(
     unfitted: _ComparedCells,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
-    """The result is empty if no change of cells removes the tip error."""
+    """Return the differing cells, or an empty tuple if no change of cells removes the tip error."""
     corrected = fit_cells(unfitted.model, unfitted.targets, _cell_mask(reference, unfitted.model), free=False)
     metres, radians = unfitted.check_targets.largest_errors(corrected)
     if metres > NEGLIGIBLE_ERROR * unfitted.targets.scale or radians > NEGLIGIBLE_ERROR:

@@ -202,8 +202,8 @@ class TableComparison:
     def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        The proof has the conditions of `metres_bound`: without limits, prismatic joints stay within 10 m of
-        zero.
+        The proof has the conditions of `metres_bound`: prismatic joints stay within their limits, or within
+        10 m of zero if they have no limits.
         """
         return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 
