@@ -316,8 +316,8 @@ ENTRY_ROUNDINGS = 2.0
 #: A length is rounded to twelve digits if the change is at most this number times eps times the path length.
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations. The first rotation is computed from roll, pitch and yaw,
-#: with an error of 3.1 eps. The second rotation is a product of three rotations, with an error of 4.2 eps:
-#: 0.5 for the sines, 0.5 for the cosines, 1.4 for the first multiplication, and 1.8 for the second.
+#: with an error of 3.1 eps. The second rotation is a product of three rotations, with an error of 4.2 eps.
+#: This error is 0.5 for the sines, 0.5 for the cosines, 1.4 for the first product, and 1.8 for the second.
 ROTATION_ROUNDINGS = 8.0
 
 #: Allowed error (in eps) of a mimicked joint's limit that is computed from a mimic joint's limit:

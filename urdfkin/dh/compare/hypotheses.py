@@ -175,8 +175,8 @@ def path_shape(table: DHTable, scale: float) -> FloatArray:
     """Return offsets, distances and angles between consecutive axes.
 
     Joint signs, joint offsets, base and tool have no effect. Angles are multiplied by `scale`. Lengths that
-    depend on free choices are replaced by 0: lengths next to a prismatic axis, the offset along the first
-    axis, and the offset along parallel axes.
+    depend on free choices are replaced by 0. These are lengths next to a prismatic axis, the offset along the
+    first axis, and the offset along parallel axes.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
