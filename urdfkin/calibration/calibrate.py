@@ -1,9 +1,8 @@
-"""Fit a robot's parameters to measured poses, and report uncertainties and warnings.
+"""Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
 
-Implausible fits (`plausible.py`) are refused. Without `write_all`, a joint parameter must change by more than
-two standard deviations. Otherwise, the parameter gets its original value. The other joint parameters are
-fitted again. This fit includes all identifiable parameters of base and tool. Parameters that the file can
-store are then written.
+A fit that is not plausible (`plausible.py`) is refused. Without `write_all`, joint parameters that changed by
+at most two standard deviations get their original values. The other parameters of joints and all identifiable
+parameters of base and tool are fitted again. Parameters that the file can store are then written.
 
 `read_poses` reads measured poses:
 
@@ -64,25 +63,22 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general_identification`.
 _GENERAL_CONFIGURATIONS = 40
-#: Maximum |noise_ratio - 1| without a warning, in standard deviations.
+#: If the noise is stated, a warning is given if `Fit.noise_ratio` differs from 1 by more than this number of
+#: standard deviations.
 _NOISE_RATIO_SIGMAS = 4.0
-#: Maximum uncertainty ratio of a parameter with good observability.
-#: `Calibration.poorly_observable` defines the ratio.
+#: A parameter is poorly observable if its ratio of uncertainties (`Calibration.poorly_observable`) exceeds
+#: this number.
 _MAX_UNCERTAINTY_RATIO = 10.0
 _RANDOM_SEED = 1
-#: J = Q R is rank-deficient if min |R_ii| <= tolerance * max |R_ij|.
+#: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: Without poses, the target's position is assumed.
-#: In the tip's frame: (L/5, L/6, L/7), m.
-#: L is `ParametricChain.characteristic_length`, m.
-#: A joint axis hardly ever passes through this position.
+#: If the tool is fitted without poses, the target is assumed at (L/5, L/6, L/7) in the tip's frame. L is
+#: `ParametricChain.characteristic_length` (m). A joint axis hardly ever passes through this position.
 _ASSUMED_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Factor of `rounding_bound` in the comparison with Pinocchio.
-#: Pinocchio rounds more often than the fit.
-#: Pinocchio reads the written file.
-#: Base and tip are computed separately.
+#: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio. Pinocchio rounds more often,
+#: because it reads the written file and computes base and tip separately.
 _ROUNDING_FACTOR = 4.0
-#: Maximum number of parameters or poses named in a warning.
+#: Maximum number of parameters or poses that a warning names.
 _MAX_NAMES = 6
 _UNKNOWN_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed joint signs do not explain the error"
@@ -96,16 +92,15 @@ class Calibration:
     Attributes:
         robot: The robot before the calibration.
         model: The model with the parameters to fit.
-        identification: The parameters that are identifiable from the measured poses. Without poses, equal to
-            `general_identification`.
+        identification: The parameters that are identifiable from the measured poses. Without poses, the same
+            as `general_identification`.
         general_identification: The parameters that are identifiable from random poses.
         full_fit: The fit; None without poses.
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: {index of a poorly observable parameter: ratio of uncertainties}. Numerator:
-            uncertainty at the measured configurations. Denominator: uncertainty at equally many random
-            configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to its uncertainty at the
+            measured configurations, divided by its uncertainty at equally many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
@@ -263,23 +258,23 @@ def calibrate(
         fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "gains":
             the scale factors of the joint values. "origins": six numbers of each joint origin. For a table,
-            "origins" means the cells of the table. Cell beta is fitted only if the next axis is nearly
-            parallel, or beta is not 0.
-        noise: Standard deviations of a position coordinate (m) and of a rotation about an axis (rad). By
-            default, the noise is estimated from the residuals.
+            "origins" means the cells of the table. A row has the cell beta only if the next axis is nearly
+            parallel or beta is not 0.
+        noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
+            an axis (rad). By default, the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
         full_poses: Whether you will measure full poses, not only positions. The argument has no effect if
             `poses` is given.
         radians: True if joint angles of more than one turn are in radians.
-        force: Whether to return an implausible fit; `plausibility` then contains the reasons. Joint values
-            that look like degrees are refused even with `force`. Convert degrees to radians, or pass
-            `radians=True` if the values are in radians.
+        force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
+            Joint values that look like degrees are refused even with `force`. Convert degrees to radians, or
+            pass `radians=True` if the values are in radians.
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
-        InputError: an array has a wrong shape, a number is not finite, or there are no poses. Also if
-            positions are not in metres. Also if only one of `q` and `poses` is given. Also if `tip` or `base`
-            is given for a table.
+        InputError: an array has a wrong shape, a number is not finite, there are no poses, or the positions
+            are not in metres. Also raised if only one of `q` and `poses` is given, and if `tip` or `base` is
+            given for a table.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
@@ -369,10 +364,7 @@ def fit_model(
 
 
 def _values_with_assumed_target(model: CalibrationModel) -> FloatArray:
-    """Return the original parameters (p,).
-
-    If the tool is fitted, the target is at its assumed position.
-    """
+    """Return the original parameters (p,); if the tool is fitted, the target has its assumed position."""
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.is_base_or_tool and parameter.element == "tool" and parameter.unit == "m":
@@ -476,9 +468,9 @@ def _add_identifiable(
     stated: Noise | None,
     full_fit: Fit,
 ) -> tuple[Identification, Fit]:
-    """Add parameters that significantly reduce the residuals.
+    """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
 
-    The fitted values can make more parameters identifiable. For example, the original tip can lie on the last
+    At the original values, fewer parameters can be identifiable, for example if the tip lies on the last
     joint's axis.
     """
     again = identify(
@@ -533,17 +525,14 @@ def _find_poorly_observable(
 
 
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
-    """Check the written model.
-
-    A URDF cannot contain base, tool and gains. These parameters are 0 in the check.
-    """
+    """Check the written model with base, tool and gains set to 0, because a file cannot contain them."""
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:
         return None
     parameter_values = fitted.parameter_values.copy()
     parameter_values[[p.is_base_or_tool or p.name == "gain" for p in calibration.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # The first `load` gave these warnings.
+        warnings.simplefilter("ignore")  # The first `load` has already given the warnings.
         if (table := calibration.table) is not None:
             robot = load(table)
             robot.placement(robot.neutral(), robot.tip_frame)
@@ -624,8 +613,8 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
         )
 
 
-#: Maximum error of rotation matrices, last rows and quaternion lengths.
-#: Numbers in files are rounded, so the tolerance is large.
+#: Largest accepted error of a rotation matrix, of a pose's last row, or of the length of a quaternion. The
+#: tolerance is large, because numbers in files are rounded.
 _ROTATION_TOLERANCE = 1e-3
 _POSITION_COLUMNS, _QUATERNION_COLUMNS = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX_COLUMNS = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
@@ -642,7 +631,7 @@ def read_poses(
     units: Mapping[str, str] | None = None,
     default_q: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Read configurations (s, nq) with poses (s, 4, 4) or positions (s, 3), m.
+    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), m.
 
     A CSV file must contain `required_coordinates`. `default_q` (nq,) contains the values of coordinates
     without a column.

@@ -1,10 +1,10 @@
-"""Identify and fit model parameters from measured poses.
+"""Identify and fit the parameters of a model from measured poses.
 
-**Identifiability.** A parameter change without effect on the measurements is not identifiable. The null space
-of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
+**Identifiability.** A change of parameters without effect on the measurements cannot be identified. The null
+space of the stacked Jacobian contains all changes without effect. The rank of this Jacobian is the number of
 identifiable parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value. The
-bound takes rounding errors into account (Weyl's inequality). The rank is the number of positive lower bounds.
-The rank needs no tolerance.
+bound takes rounding errors into account (Weyl's inequality). The rank is the number of singular values with
+a positive lower bound, so no tolerance is needed.
 
 Some changes of a joint's frame can be compensated by an opposite change of the next frame (Everett, Driels
 and Mooring, 1987):
@@ -24,9 +24,9 @@ base to tip. A fixed joint comes last. Each parameter has a column in the Jacobi
     candidate: a column with a remainder that is at least half as long as the longest remainder
     next chosen column: the first candidate in the model's order of preference
 
-Columns with shorter remainders are excluded. Fitted parameters with nearly dependent columns can become very
-large. Four lengths along nearly parallel axes are an example. The lengths could be hundreds of metres, with a
-small sum.
+Columns with shorter remainders are excluded, because fitted parameters with nearly dependent columns can
+become very large. For example, four fitted lengths along nearly parallel axes could be hundreds of metres,
+and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum:
@@ -37,8 +37,8 @@ Each error is divided by the standard deviation of its noise. At the minimum:
     H = J C J^T         hat matrix
     1 - H_ii            redundancy of measurement i
 
-The residuals give an estimate of unstated noise. The estimation is repeated until the estimates are constant
-(Foerstner's variance components).
+If you do not state the noise, the noise is estimated from the residuals. The estimation is repeated until
+the estimates are constant (Foerstner's variance components).
 
     variance of the positions = sum of their squared residuals / sum of their redundancies
     variance of the rotations = sum of their squared residuals / sum of their redundancies
@@ -51,9 +51,9 @@ A pose is an **outlier** if its statistic is too large:
     limit                     without outliers, some statistic exceeds it with a probability of about 1 %
 
 One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
-The steps end without outliers, or at the maximum number of outliers.
+The steps end when no outlier is left, or at the maximum number of outliers.
 
-**Start values.** The measured poses give start values of base and tool.
+**Start values.** Before the fit, start values of base and tool are computed from the measured poses.
 
     T_i, R_i, p_i       robot's poses, with rotations and positions
     M_i, R_Mi, p_Mi     measured poses
@@ -64,12 +64,10 @@ The steps end without outliers, or at the maximum number of outliers.
     R_B^T R_Mi = R_i R_X              linear in R_B and R_X; their entries form the null vector (Shah, 2013)
     p_Mi = R_B (R_i x + p_i) + b      linear in x and b
 
-Let only positions be measured, and let base and target be unknown. The module repeats two steps:
-
-1. Solve for R_B at the last value of x.
-2. Solve for x and b at this R_B. These equations are linear.
-
-The first x is 0. If the error stays large, the repetition begins again with other rotations R_B.
+If only positions are measured, and both base and tool are fitted, the module repeats two steps. The first
+step solves for R_B with the last value of x. The second step solves for x and b with this R_B; the equations
+are linear. At the beginning, x is 0. If the error stays large, the module starts again with other rotations
+R_B.
 """
 
 from __future__ import annotations
@@ -91,11 +89,12 @@ from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: Minimum length of a candidate's remainder / longest remainder.
+#: The remainder of a candidate has at least this fraction of the length of the longest remainder.
 _PIVOT_FRACTION = 0.5
-#: Maximum number of names in "same effect as ...".
+#: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
-#: Minimum effect of a named parameter / total effect.
+#: The text "same effect as ..." names only parameters with more than this fraction of the fixed parameter's
+#: effect.
 _MIN_EFFECT_FRACTION = 1e-6
 
 
@@ -205,18 +204,19 @@ def join_names(names: Iterable[str], limit: int) -> str:
     return ", ".join(every[:limit]) + (f" and {len(every) - limit} more" if len(every) > limit else "")
 
 
-#: Minimum total redundancy for `Fit.has_redundancy`.
-#: The total redundancy is an integer plus rounding errors.
+#: `Fit.has_redundancy` is true if the total redundancy is at least this number. The total redundancy is an
+#: integer plus rounding errors.
 _MIN_TOTAL_REDUNDANCY = 0.5
-#: Relative limit below which an eigenvalue of I - H_ii is 0.
-#: Errors along eigenvectors of eigenvalue 0 do not change residuals.
+#: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero. A
+#: measurement error along an eigenvector with the eigenvalue zero does not change the residuals.
 _EIGENVALUE_CUTOFF = 1e-9
 _MAX_NOISE_ESTIMATES = 20
-#: Relative change at which the noise estimation ends.
+#: The noise estimation ends when the relative change of the estimated noise is at most this number.
 _NOISE_CONVERGENCE = 1e-3
-#: Probability of any reported outlier in data without outliers.
+#: Probability that urdfkin reports at least one outlier in a data set without outliers. The number is also
+#: the significance level for additional identifiable parameters.
 FALSE_ALARM = 0.01
-#: Significance limit of a parameter's change, in standard deviations.
+#: A parameter's change is significant if it exceeds this number of standard deviations.
 SIGMAS = 2.0
 _MAX_OUTLIER_FRACTION = 0.25
 
@@ -225,8 +225,7 @@ _MAX_OUTLIER_FRACTION = 0.25
 class Measurements:
     """Measured poses or positions.
 
-    If the model has `base` parameters, the measurements are in the instrument's frame. Otherwise, the
-    measurements are in the base frame.
+    The measurements are in the instrument's frame if the model has `base` parameters, else in the base frame.
 
     Attributes:
         joint_values: (s, n) joint values of the path, rad or m.
@@ -272,12 +271,11 @@ class Fit:
 
     Attributes:
         parameter_values: (p,) values of all parameters.
-        residuals: (s, 6) or (s, 3) measured minus computed values, m and rad. The frame is that of the
-            measurements.
+        residuals: (s, 6) or (s, 3) measured minus computed values, in the measurements' frame, m and rad.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in their units. Infinite for a fit without
-            redundancy and without stated noise.
-        redundancies: (s, 6) or (s, 3) redundancies 1 - H_ii of the measured coordinates.
+        covariance: (k, k) covariance of the fitted parameters, in their units. If the noise is not stated,
+            a fit without redundancy has an infinite covariance.
+        redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         chi_squares: (s,) chi^2 statistic of each pose.
     """
 
@@ -299,9 +297,7 @@ class Fit:
 
     @property
     def noise_ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise.
-
-        Correctly stated noise gives a ratio of about 1.
+        """The ratio of the noise in the residuals to the stated noise; about 1 if the stated noise is true.
 
         The ratio is nan if `has_redundancy` is false.
         """
@@ -347,10 +343,7 @@ def fit_parameters(
     noise: Noise | None,
     parameter_values: FloatArray,
 ) -> Fit:
-    """Fit the parameters with the indices `free_parameters`.
-
-    `parameter_values` (p,) are the start values.
-    """
+    """Fit the parameters with the indices `free_parameters`, starting from `parameter_values` (p,)."""
     problem = _LeastSquares(
         model,
         measurements,
@@ -376,10 +369,7 @@ def fit_parameters(
 
 
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
-    """Estimate the noise; the minimum is the rounding error.
-
-    The estimate is a divisor and must not be 0.
-    """
+    """Estimate the noise; the estimate is at least the rounding error, because it is later a divisor."""
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
     def estimate_deviation(part: slice, minimum: float, default: float) -> float:
@@ -432,7 +422,7 @@ class _LeastSquares:
         Q, R = np.linalg.qr(J / units)
         half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
         blocks = Q.reshape(len(self.measurements), k, len(self.free_parameters))
-        # Diagonal blocks of I - H (hat matrix H).
+        # `redundancy` contains the diagonal blocks of I - H, where H is the hat matrix.
         redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)
         own = r.reshape(-1, k)
         inverse = np.linalg.pinv(redundancy, rcond=_EIGENVALUE_CUTOFF, hermitian=True)
@@ -450,7 +440,7 @@ def reject_outliers(
     fit: Fit,
 ) -> tuple[tuple[int, ...], Fit]:
     out = list[int]()
-    # The poses that remain must give more numbers than parameters.
+    # The remaining poses must give more numbers than there are parameters.
     max_outliers = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
     max_outliers = min(int(_MAX_OUTLIER_FRACTION * len(measurements)), max_outliers)
     clean = fit
@@ -474,9 +464,9 @@ def select_significant(
 ) -> NDArray[np.bool_]:
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step sets one change to 0: the change with the smallest ratio to its standard deviation. The other
-    changes are then estimated again. `always_selected` marks the parameters that are always selected. Unknown
-    covariances are inf.
+    Each step finds the change with the smallest ratio to its standard deviation, and sets this change to 0.
+    The other changes are then estimated again. `always_selected` marks the parameters that are always
+    selected. If the covariances are unknown (inf), only these parameters are selected.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -486,8 +476,8 @@ def select_significant(
         return ~free
     x, C = changes.copy(), covariance.copy()
     while (candidates := np.flatnonzero(stays & free)).size:
-        # Rounding may make a small variance 0 or negative.
-        # Such a parameter counts as significant.
+        # Rounding may make a small variance 0 or negative. The quotient is then very large, and the parameter
+        # counts as significant.
         sizes = np.abs(x[candidates]) / np.sqrt(np.maximum(C[candidates, candidates], MIN_DIVISOR))
         k = candidates[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -502,29 +492,28 @@ def select_significant(
 def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
     """Return the chi^2 quantile (Wilson and Hilferty, 1931).
 
-    The relative error is below 1 % at the probability 0.99. From 3 degrees of freedom, the error is below 6 %
-    for probabilities from 0.9 to 0.99999.
+    The relative error is below 1 % at the probability 0.99. For 3 or more degrees of freedom, the relative
+    error is below 6 % at the probabilities from 0.9 to 0.99999.
     """
     step = 2.0 / (9.0 * degrees_of_freedom)
     return degrees_of_freedom * (1.0 - step + NormalDist().inv_cdf(probability) * math.sqrt(step)) ** 3
 
 
-#: Maximum number of iterations for start values.
+#: Maximum number of repetitions in the computation of start values for base and tool.
 _MAX_START_REPETITIONS = 200
-#: Relative change of the target's position at which iterations end.
+#: The repetitions end when the relative change of the target's position is at most this number.
 _TARGET_CONVERGENCE = 1e-9
-#: The repetition can end at a local minimum.
-#: One cause is a target far from the tip of a small arm.
-#: So the repetition also starts at these rotations of the base.
+#: The repetition can end at a local minimum, for example if the target is far from the tip of a small arm. If
+#: the error is not small, the repetition therefore starts again at these rotations of the base.
 _START_ROTATIONS = tuple(np.diag(x) for x in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]))
-#: Error of start values without another start, relative to the spread of the positions.
+#: If the error of the start values is at most this fraction of the spread of the positions, no other start is
+#: tried.
 _SMALL_START_ERROR = 0.01
-#: Maximum ratio: spread of measured positions / tip positions.
-#: Positions in millimetres give a ratio of about 1000.
+#: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions. The
+#: quotient is about 1000 if positions are in millimetres by mistake.
 _MAX_SPREAD_RATIO = 100.0
-#: Minimum spread of tip positions, relative to the characteristic length.
-#: A tip on the last axis hardly moves.
-#: A target beside the last axis moves.
+#: The spread of the tip positions counts as at least this fraction of the model's characteristic length. A
+#: tip on the last axis hardly moves, but a target beside the axis does.
 _MIN_SPREAD_OF_LENGTH = 0.1
 
 

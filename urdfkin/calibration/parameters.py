@@ -1,10 +1,9 @@
-"""Model a path by parameters, and compute the Jacobian of the tip's pose.
+"""Model a path by parameters, and compute the Jacobian of the tip's pose with respect to the parameters.
 
-The columns of the Jacobian are derivatives with respect to the parameters. The parameters are numbers of URDF
-joint origins, or cells of a Denavit-Hartenberg table. A model is a path (`urdfkin.model.path`). A path is the
-product of constant poses and elementary motions. A joint origin and a row of a table have this form. An
-elementary motion rotates by an angle or translates by a length. This angle or length is a parameter or the
-value of a joint. A joint can have a gain g:
+The parameters are numbers of a URDF's joint origins, or cells of a Denavit-Hartenberg table. A model is a
+path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint origin and a row
+of a table have this form. An elementary motion is a rotation by an angle or a translation by a length. The
+angle or length is a parameter or the value of a joint. A joint can have a gain g:
 
     q              value of the joint
     (1 + g) q      angle or length of the joint's motion
@@ -14,10 +13,10 @@ value of a joint. A joint can have a gain g:
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint at
 an end of the path has the same six parameters in two cases:
 
-- directly before the tip
-- directly after the base, if the path leads from child to parent
+- The fixed joint is directly before the tip.
+- The fixed joint is directly after the base, and the path leads from child to parent.
 
-Other fixed joints have no parameters. Parameters of a moving joint have the same effect.
+Other fixed joints have no parameters, because the parameters of a moving joint have the same effect.
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis
@@ -25,16 +24,17 @@ Other fixed joints have no parameters. Parameters of a moving joint have the sam
 
 The parameter z shifts the origin along the joint's axis. A change of rz changes the zero position of a
 revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
-store. `base` and `tool` have six parameters each. The path begins with `base`: the robot's base in the
-instrument's frame. The path ends with `tool`: the target in the tip's frame.
+store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
+robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
+the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. Hayati's beta is a fifth parameter in two cases:
 
 - The row's axis and the next axis are parallel within `PARALLEL_TOLERANCE`.
 - beta is not 0 in the original table.
 
-With parallel axes, d has the same effect as parameters of other rows. A tilt in any direction needs both
-alpha and beta.
+In a row with parallel axes, d has the same effect as parameters of other rows. A tilt of the axis in any
+direction needs both alpha and beta.
 """
 
 from __future__ import annotations
@@ -81,10 +81,10 @@ class ParametricMotion(ElementaryMotion):
     """An elementary motion that depends on a parameter or a joint.
 
     Attributes:
-        parameter: Index of the parameter. The parameter of a joint's motion is the gain; None without a gain.
-        joint: Index of the joint; None without a joint.
-        sense: Sign of the angle or length. -1 on a path from child to parent, or if the row subtracts the
-            joint's value. Otherwise 1.
+        parameter: Index of the parameter. A joint's motion has the index of the gain; None without a gain.
+        joint: Index of the joint; None if the angle or length does not depend on a joint.
+        sense: Sign of the angle or length: -1 if the path leads from child to parent, or if the row subtracts
+            the joint's value. Otherwise 1.
     """
 
     parameter: int | None
@@ -112,10 +112,7 @@ class ParametricChain:
 
     @property
     def characteristic_length(self) -> float:
-        """Length (m) that converts angles to distances.
-
-        The sum of the model's lengths; 1 if this sum is 0.
-        """
+        """Length (m) that converts angles to distances: the sum of the model's lengths, or 1 if it is 0."""
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -127,8 +124,7 @@ class ParametricChain:
     def poses(self, joint_values: FloatArray, parameter_values: FloatArray | None = None) -> FloatArray:
         """Return the tip's poses (s, 4, 4).
 
-        If the model has `base` parameters, the poses are in the instrument's frame. Otherwise, the poses are
-        in the base frame.
+        The poses are in the instrument's frame if the model has `base` parameters, else in the base frame.
         """
         return self.path.poses(
             self._amounts_and_derivatives(
@@ -137,10 +133,7 @@ class ParametricChain:
         )
 
     def frames(self, joint_values: FloatArray, parameter_values: FloatArray) -> FloatArray:
-        """Return the poses (s, steps, 4, 4) after each transform of the path.
-
-        The last pose is that of the tip.
-        """
+        """Return the poses (s, steps, 4, 4) after each transform of the path; the last pose is the tip's."""
         return self.path.frames(self._amounts_and_derivatives(joint_values, parameter_values)[0])
 
     def poses_and_jacobian(
@@ -149,10 +142,10 @@ class ParametricChain:
         parameter_values: FloatArray | None = None,
         frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return tip poses (s, 4, 4) and their Jacobian (s, 6, p).
+        """Return the tip's poses (s, 4, 4), and their Jacobian (s, 6, p) with respect to the parameters.
 
-        The derivatives are with respect to the parameters. The linear rows come first. `frames` is the result
-        of the method `frames`, if already known.
+        The linear rows come first. `frames` is the result of the method `frames` if it has already been
+        computed.
         """
         amounts, factors = self._amounts_and_derivatives(
             joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -169,10 +162,7 @@ class ParametricChain:
     def _amounts_and_derivatives(
         self, joint_values: FloatArray, parameter_values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return angles or lengths (s, motions), and their derivatives.
-
-        The derivatives are with respect to the parameters.
-        """
+        """Return angles or lengths (s, motions), and their derivatives with respect to the parameters."""
         factors = np.empty((len(joint_values), len(self._parametric_motions)))
         numbers = np.ones(len(self._parametric_motions))
         for k, motion in enumerate(self._parametric_motions):
@@ -196,14 +186,13 @@ class ParametricChain:
         return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * total_length
 
 
-#: Maximum angle (rad) between parallel axes of a table.
-#: Parallel axes of real arms differ by some milliradians.
+#: Largest angle (rad) between two axes of a table that are treated as parallel. Parallel axes of a real arm
+#: deviate by some milliradians.
 PARALLEL_TOLERANCE = math.radians(5.0)
 
 PARAMETER_SETS = ("base", "tool", "offsets", "origins", "gains")
-#: (name, is_rotation, axis) of each joint origin parameter.
-#: The axes 0, 1, 2 are x, y, z.
-#: The new origin is the product in this order.
+#: (name, is_rotation, axis) of each parameter of a joint origin. The axes 0, 1 and 2 are x, y and z. The new
+#: origin is the product of the motions in this order.
 ORIGIN_PARAMETERS = (
     ("x", False, 0),
     ("y", False, 1),
@@ -213,10 +202,9 @@ ORIGIN_PARAMETERS = (
     ("rz", True, 2),
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
-#: Parameters in order of preference.
-#: False: prismatic joint. True: another joint, base or tool.
-#: Of parameters with the same effect, the first is fitted.
-#: Order: zero position, axis, rest of the frame, gain.
+#: Parameters in order of preference. The key is False for a prismatic joint, and True for another joint, base
+#: or tool. If several parameters have the same effect, the first of them is fitted and the others stay fixed.
+#: The order is: zero position, axis, other numbers of the joint's frame, gain.
 _ORIGIN_PREFERENCES = {
     True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
     False: ("z", "rx", "ry", "x", "y", "rz", "gain"),
@@ -230,7 +218,7 @@ class CalibrationModel:
     """A parametric chain with grouped parameters.
 
     Attributes:
-        parameter_groups: Parameter indices in order of preference, for base, tool and each joint.
+        parameter_groups: Parameter indices of the base, the tool and each joint, in order of preference.
     """
 
     chain: ParametricChain
@@ -250,7 +238,7 @@ class CalibrationModel:
     def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
         """Return the changed joint origins (4, 4) by joint name.
 
-        The origin of a locked joint does not include the lock's value.
+        The origin of a locked joint does not include the value at which the joint is locked.
         """
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
@@ -357,9 +345,8 @@ class _ModelBuilder:
                 remedy="choose a path with a joint, or add base or tool to the fit",
             )
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # Only joint parameters are nearly known before the fit.
-        # So base and tool come first.
-        # A fixed joint comes last, as on a path from parent to child.
+        # Base and tool come first, because only the joint parameters are nearly known before the fit. A fixed
+        # joint comes last, as on a path from parent to child.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters),
             key=lambda one: (not one[1], one[0] not in path.coupling.joints),

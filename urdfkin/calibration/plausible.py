@@ -1,7 +1,7 @@
 """Check the plausibility of a fit, and find the likeliest mistake in the data.
 
-Least squares also fits wrong data, for example joint values in degrees. A fit is refused for any of these
-reasons:
+Least squares also computes a fit if the data are wrong, for example if joint values are in degrees. A fit is
+refused for any of these reasons:
 
 - The rms position error is a large fraction of the robot's reach.
 - The rms position error is a smaller fraction of the reach, but a large fraction of the spread of the
@@ -14,7 +14,7 @@ reasons:
 - The fit is inaccurate, and a correction of a common mistake in the data makes the fit much more accurate.
 - The fit changes a joint's zero by about half a turn, and the fit is plausible after such a correction.
 
-The module corrects common mistakes in the data, one at a time. After each correction, the module fits again.
+To find the likeliest mistake, the module corrects common mistakes in the data, one at a time, and fits again.
 The first correction with a plausible fit shows the likeliest mistake.
 """
 
@@ -42,39 +42,38 @@ from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, limits_with_margin
 
-#: Maximum plausible rms position error / reach.
+#: The rms position error of a plausible fit is at most this fraction of the reach.
 _MAX_ERROR_OF_REACH = 0.05
-#: An rms position error above both fractions is not plausible.
-#: Fractions: of the reach, and of the spread.
-#: Spread: rms distance of the measured positions from their mean.
+#: A fit is not plausible if its rms position error exceeds both fractions, of the reach and of the spread.
+#: The spread is the rms distance of the measured positions from their mean.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An rms position error above both products is not plausible:
-#: fraction 1 * reach; fraction 2 * error of `base_tool_fit`.
+#: A fit is not plausible if its rms position error exceeds both fractions. The first is a fraction of the
+#: reach. The second is a fraction of the rms position error of a fit of base and tool alone.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _MAX_ORIENTATION_ERROR = 0.2
-#: Above either limit, urdfkin searches for mistakes in the data.
-#: Limits: rms position error / reach, rms orientation error (rad).
+#: If a fit exceeds one of these limits, the module searches for common mistakes in the data. The limits are
+#: for the rms position error as a fraction of the reach, and the rms orientation error (rad).
 _SUSPECT_ERROR_OF_REACH, _SUSPECT_ORIENTATION_ERROR = 0.002, 0.005
-#: Maximum plausible changes: tilt of a joint axis (rad), gain.
+#: Largest plausible tilt of a joint's axis (rad), and largest plausible change of a gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
-#: Distinct configurations differ after rounding to this number (rad, m).
+#: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
 _JOINT_VALUE_RESOLUTION = 1e-6
-#: A limit applies to |change| - margin * standard deviation.
-#: So an uncertain change does not make a fit implausible.
+#: This number of standard deviations is subtracted from a parameter's change before the limit is applied.
+#: Therefore, an uncertain change does not make a fit implausible.
 _CHANGE_MARGIN_SIGMAS = 5.0
-#: Maximum error after a correction / original error.
+#: An accepted correction has at most this multiple of the original error.
 _MAX_IMPROVED_ERROR_RATIO = 0.25
-#: The same ratio for a fit that is implausible or has `half_turn_zeros`.
+#: This multiple applies if the original fit is not plausible, or changes a zero position by half a turn.
 _MAX_SIMILAR_ERROR_RATIO = 1.5
-#: Maximum number of corrections with a fit of all parameters.
-#: The corrections with the smallest `error_before` are fitted.
+#: Maximum number of corrections for which all parameters are fitted. The corrections with the smallest errors
+#: before this fit are chosen.
 _MAX_FITS = 4
-#: Tested row shifts of q relative to the poses.
-#: Shift k: row i + k belongs to pose i.
+#: urdfkin tries these shifts of the rows of q relative to the poses. The shift k means that row i + k of q
+#: belongs to pose i.
 _ROW_SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
-#: Too few configurations prevent the search for a correction.
+#: With too few configurations, urdfkin does not search for a correction of the data.
 _TOO_FEW_CONFIGURATIONS = "too few different configurations; measure poses at more configurations"
 
 
@@ -113,8 +112,8 @@ class FitWithData:
     def reach(self) -> float:
         """Reach of the original model at the measured configurations, m.
 
-        The reach is the tip's largest distance from the base or a rotation axis. The rotation axes are those
-        of the parameters rz and theta. The reach is at most `characteristic_length`.
+        The reach is the largest distance of the tip from the base, or from the axis of a parameter rz or
+        theta. The reach is at most `characteristic_length`.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
@@ -124,10 +123,7 @@ class FitWithData:
         return min(chain.characteristic_length, float(max(levers, distance))) or chain.characteristic_length
 
     def residual_deviation(self, reach: float) -> float:
-        """Return the residuals' standard deviation (m).
-
-        Angles (rad) are multiplied by the reach (m).
-        """
+        """Return the residuals' standard deviation (m); angles (rad) are multiplied by the reach (m)."""
         return _norm(self.full_fit.residuals, reach) / math.sqrt(max(self.full_fit.total_redundancy, 1.0))
 
     def redundancy_objections(self) -> list[str]:
@@ -338,7 +334,7 @@ def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
 def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
     """Reverse the signs of joints one by one while the error decreases.
 
-    Return None for fewer than two reversed joints. `_corrections` yields each single joint.
+    Return None for fewer than two reversed joints, because each single joint has its own correction.
     """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
@@ -396,8 +392,5 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm (m) of the residuals.
-
-    Rotations (rad) are multiplied by the reach (m).
-    """
+    """Return the norm (m) of the residuals; rotations (rad) are multiplied by the reach (m)."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))

@@ -1,12 +1,10 @@
-"""Apply the factory calibration of a Universal Robots arm.
+"""Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The ROS driver of the arm writes the calibration to a YAML file.
-
-The controller stores Denavit-Hartenberg parameters. Nominally parallel axes of the arm differ by about a
-milliradian. The common normal of these axes is far away. The parameters d of consecutive rows can therefore
-be hundreds of metres. These parameters cancel each other. The driver's program `ur_calibration` shifts the
-link frames along their axes. All offsets are then small. The program writes x, y, z, roll, pitch and yaw of
-each joint in the previous joint's frame.
+The controller stores Denavit-Hartenberg parameters. The angle between two nominally parallel axes of the arm
+is about a milliradian, so their common normal is far away. The parameters d of consecutive rows can therefore
+be hundreds of metres, and cancel each other. The driver's program `ur_calibration` shifts the link frames
+along their axes, so that all offsets become small. The program writes the pose of each joint in the frame of
+the previous joint: x, y, z, roll, pitch and yaw.
 
 The order of the rotations is ambiguous:
 
@@ -17,7 +15,7 @@ The order of the rotations is ambiguous:
     difference of the two products: about 1.4 times the small angle
 
 With the order "driver", the result agrees with the robot's controller. With the order "urdf", the result
-agrees with the ROS package's URDF.
+agrees with the URDF that the ROS package generates from the file.
 """
 
 from __future__ import annotations
@@ -44,7 +42,7 @@ from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: {link in the calibration file: parent joint}, base to tip.
+#: Parent joint of each link in the calibration file, from base to tip.
 PARENT_JOINTS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -53,24 +51,21 @@ PARENT_JOINTS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: Order of roll, pitch and yaw in SciPy's notation.
-#: Uppercase letters: moving axes. Lowercase letters: fixed axes.
+#: Order of the rotations by roll, pitch and yaw, in SciPy's notation. Uppercase letters mean moving axes, and
+#: lowercase letters mean fixed axes.
 ROTATION_ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _ORIGIN_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of random configurations in the fit and the check.
+#: Number of random configurations for the fit of the joint origins, and for the check of the new URDF.
 _FIT_SAMPLES = 40
 _FIT_SEED, _CHECK_SEED = 2, 3
-#: Maximum fit residual and maximum pose error, m or rad.
-#: A successful fit has rounding errors of about 1e-15.
+#: Largest residual of the fit, and largest difference of the new URDF's poses (m and rad). If the joint
+#: origins can represent the calibrated arm, the residual is a rounding error of about 1e-15.
 _MAX_RESIDUAL = 1e-8
 _DISPLACEMENT_SAMPLES = 1000
 
 
 def read_calibrated_origins(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Return {joint name: origin (4, 4)} from a calibration file.
-
-    A `default_kinematics.yaml` is also allowed.
-    """
+    """Return joint origins (4, 4) by joint name, from a calibration file or a `default_kinematics.yaml`."""
     if order not in ROTATION_ORDERS:
         raise UnknownNameError("order of rotations", order, ROTATION_ORDERS)
     try:
@@ -98,9 +93,8 @@ def _parse_origin(kinematics: Mapping[Any, Any], link: str, rotation_order: str,
         raise InputError("the calibration file lacks a link", where=where, found=f"no {link}")
     six = []
     for name in _ORIGIN_KEYS:
-        # The driver writes 0.00001 as 1e-05; YAML 1.1 reads a string.
-        # A list of YAML references can be very long.
-        # A list is therefore reported by its type.
+        # The driver writes 0.00001 as 1e-05, which YAML 1.1 reads as a string. The message names only the
+        # type of a list, because a list with YAML references can be very long.
         value = entry.get(name)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
@@ -122,8 +116,8 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all joints turn about z, the joint origins are copied from the file. Otherwise, the origins are fitted.
-    The fit uses poses of `tool0` in `base` of the calibrated arm.
+    If all joints turn about z, the joint origins are copied from the file. If a joint of the URDF has another
+    axis, the origins are fitted to the calibrated arm's poses of `tool0` in `base`.
     """
     robot = as_robot(robot)
     origins = read_calibrated_origins(path, order)
@@ -184,7 +178,7 @@ def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare the new URDF's `tool0` poses with the calibration file."""
+    """Compare `tool0` poses of the new URDF with poses computed from the calibration file."""
     written = result.new_robot
     q = written.sample(_FIT_SAMPLES, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
@@ -203,9 +197,9 @@ def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) ->
 def largest_tip_displacement(
     first_origins: Mapping[str, FloatArray], second_origins: Mapping[str, FloatArray]
 ) -> tuple[float, float]:
-    """Return the largest distance (m) and angle (rad) between `tool0` of two arms.
+    """Return the largest distance (m) and angle (rad) between the `tool0` frames of two arms.
 
-    The configurations are random samples. Instead of the angle, 2 sin(angle / 2) is returned. This value is
+    The configurations are random samples. Instead of the angle, 2 sin(angle / 2) is returned, which is
     accurate only for small angles.
     """
     paths = [

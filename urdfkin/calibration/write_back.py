@@ -25,7 +25,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion_before_element
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals: the precision of a double near 1.
+#: Written metres and radians have 15 decimals, the precision of a double near 1.
 _DECIMALS = 15
 _ROUNDING = 10.0**-_DECIMALS
 
@@ -33,11 +33,11 @@ _ROUNDING = 10.0**-_DECIMALS
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Write new joint origins into a URDF.
 
-    A number of xyz or rpy keeps its digits if only rounding changes it.
+    A number in the attribute xyz or rpy keeps its digits if it changes only by rounding.
 
     Args:
         data: The original URDF.
-        origins: {name of a changed joint: new origin (4, 4)}.
+        origins: The new origin (4, 4) of each changed joint, by joint name.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -69,10 +69,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Format three numbers.
-
-    A number equal to `old` up to rounding keeps its digits.
-    """
+    """Format three numbers; a number that is equal to `old` up to rounding keeps its digits."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
@@ -91,7 +88,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    # At pitch ±90 degrees, roll can keep its old value.
+    # At pitch ±90 degrees, roll and yaw turn about the same axis, so roll can keep its old value.
     if math.cos(pitch) <= ANGLE_ROUNDINGS * EPS:
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
@@ -108,7 +105,7 @@ class UpdatedURDF:
 
     Attributes:
         robot: The robot before the change.
-        origins: {name of a changed joint: new origin (4, 4)}.
+        origins: The new origin (4, 4) of each changed joint, by joint name.
         certificate: Result of Pinocchio's check of the new URDF; None if not checked.
     """
 
@@ -134,7 +131,7 @@ class UpdatedURDF:
 
     @cached_property
     def displacements(self) -> dict[str, tuple[float, float]]:
-        """{joint name: (distance in m, angle in rad)} between old and new origin."""
+        """The distance (m) and the angle (rad) between the old and the new origin, by joint name."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {

@@ -1,20 +1,20 @@
 """Compute the transform between two consecutive joint axes.
 
-The z axis of each joint frame is the joint's axis. A is the constant pose of the second frame in the first
-frame. `find_axis_transform` writes A as a product:
+The z axis of each joint frame is the joint's axis. A is the constant pose of the second joint's frame in the
+first joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
 Rz(phi) Tz(delta) commutes with the motion of the first joint. The first joint's row therefore contains phi in
-theta, and delta in d. The second joint's row contains phi_next in theta, and delta_next in d.
+theta, and delta in d. Likewise, the second joint's row contains phi_next in theta, and delta_next in d.
 
-If skew axes are not nearly parallel, beta is 0. The x axis then has two possible directions. For each
+If skew axes are not nearly parallel, beta is 0, and the x axis has two possible directions. For each
 direction, the six other numbers are unique (Denavit and Hartenberg). The page docs/dh.md explains parallel
 and nearly parallel axes.
 
 Parallel axes determine only the sum of their offsets d. Coinciding axes determine only the sum of their
-angles theta. `match_axis_transforms` copies these cells from a reference table. One of these cells is
-computed from the sum instead. In a Hayati row, the axes do not determine d.
+angles theta. `match_axis_transforms` copies these cells from a reference table, except one cell that is
+computed from the sum. In a Hayati row, any d is possible, because the axes do not determine d.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from urdfkin.kinematics.roundings import (
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Axes with a smaller tilt (rad) count as nearly parallel.
-#: A tilt of 1e-2 amplifies length errors by 100.
+#: Two axes with a smaller tilt (rad) count as nearly parallel. At this tilt, an error of 1 mm in the URDF can
+#: move the common normal by 100 mm.
 NEARLY_PARALLEL = 1e-2
 
-#: Largest sine of the tilt for a Hayati row.
+#: Two axes get a Hayati row only if the sine of their tilt is below this number.
 MAX_HAYATI_TILT_SINE = 0.35
 
 
@@ -137,7 +137,7 @@ def find_hayati_transform(
 ) -> AxisTransform:
     """Return a Hayati row's transform.
 
-    The x axis points to the next axis's intersection with the xy plane.
+    The x axis points to the intersection of the next axis with the xy plane.
     """
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
@@ -176,10 +176,10 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Two consecutive joint axes, and the reference row of the first joint.
+    """Two consecutive joint axes, and the row of the first joint in the reference table.
 
-    The argument `delta_in` is an offset (m) along the first joint's axis. The offset leads from the joint's
-    DH frame to the joint frame.
+    The argument `delta_in` of a method is the offset (m) from the first joint's DH frame to its joint frame,
+    along the joint's axis.
     """
 
     A: FloatArray
@@ -194,7 +194,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether d is free: for parallel axes and for Hayati rows."""
+        """Whether the axes do not determine d, because they are parallel or the row is a Hayati row."""
         return tilt_sine(self.A) <= self.noise.radians or self._needs_hayati_row
 
     @property
@@ -259,14 +259,11 @@ def match_axis_transforms(
     *,
     keeps_first_d: bool = True,
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Match the reference's cells.
+    """Match the reference's cells; return the transform and the first joint's theta of each pair.
 
-    The first joint has the pose Rz(phi_in) Tz(delta_in) in frame 0. `tip_offset` is the required `delta_in`
-    of the last joint. None: any `delta_in` is allowed. If `keeps_first_d` is false, the reference's zero d_1
-    is not copied.
-
-    Returns:
-        The transforms of the pairs, and theta of each pair's first joint.
+    Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint. `tip_offset` is the required `delta_in` of
+    the last joint, or None if any `delta_in` is allowed. Without `keeps_first_d`, a zero d of the reference's
+    first row is not copied.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -307,9 +304,8 @@ def _choose_d(
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # A later prismatic joint or the tool compensates for d.
-        # Match the cell a of one Hayati row.
-        # Choose the row with the most tilted axes.
+        # A later prismatic joint or the tool compensates for any d. Therefore, d is chosen so that the cell a
+        # of one Hayati row equals the reference. This row is the one with the most tilted axes.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -327,9 +323,9 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    A revolute joint or the base can compensate for another theta. A prismatic joint cannot. If prismatic
-    joints i + 1 to k follow, row k alone may determine phi. In this case, theta of rows i + 1 to k equals the
-    reference.
+    A revolute joint or the base can compensate for a different theta, but a prismatic joint cannot. If
+    prismatic joints i + 1 to k follow, row k alone may determine phi. In this case, theta of rows i + 1 to k
+    equals the reference instead.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
@@ -428,7 +424,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def sum_zeroed_tilts(chain: FrameChain) -> float:
-    """Bound the orientation error (rad) due to zeroed tilts. Tilts within rounding are zeroed."""
+    """Bound the orientation error (rad) of a table with tilts within rounding errors replaced by 0."""
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_sine(A), abs(float(A[2, 0]))) if tilt <= noise.radians)

@@ -1,4 +1,4 @@
-"""Convert a table to the other convention, a kinematic tree or a URDF.
+"""Convert a table to the other convention, to a kinematic tree, or to a URDF.
 
 `urdfkin.dh.table` defines the conventions and the factors X.
 
@@ -7,10 +7,10 @@
 | modified | new tool = X_n . tool | a base Tx(a) Rx(alpha) becomes a and alpha of the first row |
 | standard | new base = base . X_1 | a tool Tx(a) Rx(alpha) becomes a and alpha of the last row |
 
-A base (tool) that becomes part of a row is replaced by the identity.
+If base or tool becomes part of a row, the new base or tool is the identity.
 
-In a tree, joint i has frame i - 1 of a standard table. For a modified table, joint i has frame i. The z axis
-of this frame is the joint's axis.
+In a tree, the z axis of a joint's frame is the joint's axis. For a standard table, joint i has frame i - 1.
+For a modified table, joint i has frame i.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def to_urdf(table: DHTable) -> str:
 
 
 def to_free_tree(table: DHTable) -> KinematicTree:
-    """Return a tree without joint limits and mimic rules. Each row has one coordinate."""
+    """Return a tree without joint limits and mimic rules, with one coordinate per row."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return make_serial_tree(table.robot, link_names(table), joints)
@@ -128,7 +128,7 @@ def _serial_joints(
 
 
 def relative_frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return the poses of all frames and the tip in the previous frame. All joints are at zero."""
+    """Return the pose of each frame, and of the tip, in the previous frame, with all joints at zero."""
     if not table.rows:
         return [table.base @ table.tool]
     if table.convention is DHConvention.STANDARD:
@@ -143,7 +143,7 @@ def link_names(table: DHTable) -> list[str]:
 
 
 def make_link_names(base: str, joints: Sequence[str], tip: str) -> list[str]:
-    """Return different link names of a serial chain."""
+    """Return a different name for each link of a serial chain."""
     names = [base]
     for joint in joints:
         names.append(make_unique(f"{joint}_link", [*names, tip]))

@@ -46,9 +46,9 @@ from urdfkin.model.tree import FloatArray
 #: The rounded angle 1.571 still counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
-#: Maximum difference of alpha, a or d for one robot.
-#: Unit: rad, or a fraction of the reach.
-#: Cells are skipped if base, tool or prismatic axes compensate.
+#: Two tables describe different robots if alpha, a or d differ by more than this number. Angles are in rad,
+#: and lengths are relative to the reach. Cells are not compared if a different base, tool or prismatic axis
+#: can compensate for their difference.
 MAX_CELL_DIFFERENCE = 0.1
 
 _OPTION_VALUES = {
@@ -88,8 +88,8 @@ class DerivationOptions:
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
     """Derive a table from a chain.
 
-    `like` is a standard table of the same joints. With `like`, `options.sign` has no effect. With `like`,
-    only the value "first" of `options.parallel_offset` has an effect.
+    `like` is a standard table of the same joints. With `like`, `options.sign` has no effect, and
+    `options.parallel_offset` has an effect only if it is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -110,7 +110,7 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
         tip = _offset_for_last_row(like, constants[-1], options, end)
         steps, thetas = match_axis_transforms(pairs, phi_in, delta_in, tip)
         if not like.rows[0].d and _has_wrong_offset(steps, like, chain.reach):
-            # The base then contains the offset along the first axis.
+            # The offset along the first axis is then a part of the base.
             steps, thetas = match_axis_transforms(pairs, phi_in, delta_in, tip, keeps_first_d=False)
     if steps:
         phi_in, delta_in = steps[-1].phi_next, steps[-1].delta_next
@@ -169,7 +169,7 @@ def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
-    """Shift axes of prismatic joints. A prismatic joint determines only a direction."""
+    """Shift the axes of prismatic joints, because such a joint determines only the direction of its axis."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
@@ -199,9 +199,9 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift the prismatic axis k to the origin of a nearly parallel axis.
+    """Shift the axis of the prismatic joint k to the origin of a neighbour with a nearly parallel axis.
 
-    Without the shift, the common normal could be far away from the robot.
+    Without the shift, the common normal of the two axes could be far away from the robot.
     """
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
@@ -218,7 +218,7 @@ def _shift_to_previous_origin(constants: list[FloatArray], k: int) -> None:
 
 
 def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """`offset` is a vector in the frame of joint k."""
+    """Shift the frame of joint k by `offset`, a vector (m) in this frame."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 
@@ -227,17 +227,17 @@ def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
 
 
 def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, phi (rad) and delta (m). Joint 1 has the pose Rz(phi) Tz(delta) in frame 0."""
+    """Return T_base_0, phi (rad) and delta (m); Rz(phi) Tz(delta) leads from frame 0 to joint 1."""
     z, p = A[:3, 2], A[:3, 3]
     offset = clean_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # x = e - (e . z) z projects the base's x axis e.
-    # The expression has no cancellation if z is near e.
+    # The projection of the base's x axis e onto the plane normal to z is x = e - (e . z) z. The expression
+    # below equals x, and has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    # If z is nearly along e, project the y axis.
+    # If z is nearly along the base's x axis, x is the projection of the base's y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
@@ -265,8 +265,8 @@ def _find_transforms_and_thetas(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # "each": row i contains the offset to a parallel axis.
-    # "first": `_sum_offsets_in_first_row` later adds these offsets.
+    # For "first" and "each", row i contains the offset from axis i to a parallel axis i + 1. For "first",
+    # `_sum_offsets_in_first_row` later adds up these offsets in one row.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -312,7 +312,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy the reference's theta and zero d, and adjust the base."""
+    """Copy theta and a zero d from the reference, and adjust the base."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE_ROUNDINGS * EPS or offset:
@@ -324,7 +324,7 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy the reference's theta, a, alpha and zero d, and adjust the tool.
+    """Copy theta, a, alpha and a zero d from the reference, and adjust the tool.
 
     Nothing is copied if both tables have no tool and nearly equal thetas.
     """
@@ -349,9 +349,9 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _fits_last_row(A: FloatArray, options: DerivationOptions, noise: PoseTolerance) -> bool:
-    """Return whether the last row can contain A. The table then needs no tool.
+    """Return whether the last row can contain A, so that the table needs no tool.
 
-    In a standard table, A must have the form Rz Tz Tx Rx. In a modified table, A must have the form Rz Tz.
+    A must have the form Rz Tz Tx Rx in a standard table, or Rz Tz in a modified table.
     """
     if options.last == "flange":
         return False
@@ -372,7 +372,7 @@ def _make_last_row(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Compute theta, d, a and alpha of the last row, and the tool.
 
-    `A` is the tip's pose in a frame at O_{n-1}. This frame is parallel to the last joint's frame.
+    `A` is the tip's pose in a frame at O_{n-1} with the axes of the last joint's frame.
     """
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])

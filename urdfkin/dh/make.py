@@ -23,18 +23,16 @@ from urdfkin.errors.validators import as_instance, as_names, as_str
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum difference (rad) of equal angles theta.
-#: The tolerance also applies to entries of rotation matrices.
+#: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _SAME_ANGLE_TOLERANCE = 1e-2
-#: Maximum difference of equal cells.
-#: Unit: rad, or a fraction of the reach.
+#: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _MIN_CELL_DIFFERENCE = 1e-12
 #: With the argument `like`, the published table determines these options.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
 def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
-    """`options.flip` must be the result of `find_reversed_joints`."""
+    """Derive a table like `reference`; `options.flip` must be the result of `find_reversed_joints`."""
     standard = replace(options, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), options.convention)
 
@@ -47,9 +45,8 @@ def find_reversed_joints(
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
-    # The base can compensate for a reversed first joint.
-    # The tool can compensate for a reversed last joint.
-    # Therefore, opposite directions of the end joints are added.
+    # The base can compensate for a reversed first joint, and the tool for a reversed last joint. Therefore,
+    # the opposite directions of these two joints are added.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -70,12 +67,12 @@ def find_reversed_joints(
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a sort key. The most similar table has the smallest key."""
+    """Return a sort key; the table most similar to the reference has the smallest key."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
         theta = abs(angle_difference(row.theta, other.theta))
-        # The tool compensates for the last row's a and alpha.
+        # The tool compensates for differences of a and alpha in the last row.
         if i < n - 1:
             is_unique = row.kind.turns and table.rows[i + 1].kind.turns
             unique = max(unique, abs(angle_difference(row.alpha, other.alpha)), a * is_unique)
@@ -137,40 +134,39 @@ def make_dh_table(
         snap: Tolerance, rad. An angle becomes a multiple of 15 degrees if it changes by at most `snap`. The
             table's attribute `snap` lists these angles, and bounds of the effect on the tip.
         last: "tip": the last row ends at the tip if possible. "flange": the last row ends on the last joint's
-            axis. The tool leads from this axis to the tip.
+            axis, and the tool leads from this axis to the tip.
         parallel_offset: Selects the rows for the offsets d along consecutive parallel axes. "last": the row
-            of the last axis contains the sum of the offsets. "first": the row of the first axis contains the
-            sum of the offsets. "each": row i contains the offset to joint i + 1.
+            of the last of these axes contains the sum of the offsets. "first": the row of the first of these
+            axes contains the sum. "each": row i contains the offset from joint i to joint i + 1.
         flip: Joints whose positive direction is reversed (`sense` is -1).
-        first: "base": d_1 and theta_1 contain translation along and rotation about the first axis. "joint":
-            d_1 and theta_1 are 0. The base transform contains the translation and the rotation (Craig's
-            frame 0).
+        first: "base": d_1 and theta_1 contain the translation along the first axis and the rotation about
+            this axis. "joint": d_1 and theta_1 are 0, and the base transform contains the translation and the
+            rotation (Craig's frame 0).
         sign: Direction of x, except in the last row, where the tip determines x. "theta": |theta| <= pi/2.
             "a": a >= 0; if a is 0, alpha >= 0. "alpha": alpha >= 0; if alpha is 0, a >= 0. If a and alpha
             are 0, the rule for "theta" applies.
         slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
             There are three exceptions. The axis of the first joint passes through the base's origin. The axis
             of the last joint passes through the tip if a standard table then needs no tool. With
-            near_parallel="strict", an axis passes through the origin of a nearly parallel neighbour.
-            "minimal": the axis passes through the origin of a neighbouring revolute joint. The distance a of
-            the two axes is then 0. The next joint has priority. Without a revolute neighbour, "minimal"
-            equals "drawn".
-        like: A published table. The result copies the table's joint directions, directions of x, and offsets
-            d along parallel axes. The result also copies theta of the first and last row. For a standard
-            table, the result copies the last a and alpha. Base and tool are adjusted to the copied cells. The
-            URDF determines all other numbers. With `like`, the options `last`, `parallel_offset`, `flip`,
-            `first` and `sign` must have their default values.
+            near_parallel="strict", an axis passes through the origin of a neighbour with a nearly parallel
+            axis. "minimal": the axis passes through the origin of a neighbouring revolute joint, so the
+            distance a of the two axes is 0. The next joint has priority. Without a revolute neighbour,
+            "minimal" equals "drawn".
+        like: A published table. The result copies the positive joint directions, the directions of the x axes
+            and the offsets d along parallel axes. It also copies theta of the first and last row, and the
+            last a and alpha of a standard table. Base and tool are adjusted to the copied cells. The URDF
+            determines all other numbers. With `like`, the options `last`, `parallel_offset`, `flip`, `first`
+            and `sign` must have their default values.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
-        InputError: an option is invalid or excluded by `like`, `like` describes another robot, or a joint is
-            planar or floating.
+        InputError: an option is invalid, or is not allowed with `like`; `like` describes another robot; or a
+            joint is planar or floating.
         RangeError: a coordinate of a joint's origin in the URDF, or a length in `like`, is above 1e150 m.
     """
     as_instance(tree, KinematicTree, "tree", "pass robot.tree")
     exact = make_chain(tree, tip, base)
-    # Pinocchio computes poses in the root frame.
-    # Therefore, the whole path from the root is checked.
+    # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]

@@ -1,9 +1,9 @@
-"""Compute velocity, Jacobian and acceleration of a table's tip.
+"""Compute velocity, Jacobian and acceleration of a table's tip by a recursion over the table's frames.
 
-A recursion over the table's frames uses the textbook's equations 7.85 and 7.127 to 7.130. In these
-equations, d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The recursion runs on a tree with the table's frames as
-joint frames. This tree has one coordinate for each row. With mimic rules, the joint values are G q + g. The
-table's Jacobian is then J_rows G, where J_rows is the tree's Jacobian.
+The recursion uses equations 7.85 and 7.127 to 7.130 of the textbook, with d_{i-1,i} = d_i z_{i-1} + a_i x_i
+(7.64). The recursion runs on a tree with the table's frames as joint frames. This tree has one coordinate for
+each row. With mimic rules, the joint values are G q + g, and the table's Jacobian is J_rows G. Here J_rows is
+the tree's Jacobian.
 """
 
 from __future__ import annotations

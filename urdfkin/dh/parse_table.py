@@ -1,10 +1,9 @@
-"""Read tables from TOML, JSON and plain text.
+"""Read tables from TOML files, JSON files, and plain text copied from a document or web page.
 
-`urdfkin.dh.rows` defines the content of TOML and JSON files. Plain text may be copied from a document or a
-web page. A table in text begins with a line of headings. The headings are a, alpha, d and theta in any order.
-Each line below the headings contains a joint's cells. Commas, semicolons, tabs, bars, ampersands or blanks
-separate the cells. Other lines may state the convention, names, base and tool. Printed tables of urdfkin
-contain such lines.
+`urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings with a,
+alpha, d and theta in any order. Below the headings, the table has a line for each joint. Commas, semicolons,
+tabs, bars, ampersands or blanks separate the cells. The lines before and after the table may state the
+convention, names, base and tool, as in the tables that urdfkin prints.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ from urdfkin.system.resources import robots_dir
 
 #: Tolerance of a rotation that is printed with six digits.
 _PRINTED_ROTATION_TOLERANCE = 1e-5
-#: Maximum number of lines below a printed pose's heading.
-#: Blank lines and Markdown fences may separate the three rows.
+#: Maximum number of lines below the heading of a printed pose. Blank lines and Markdown fences may separate
+#: the heading and the three rows.
 _MAX_POSE_LINES = 6
 #: A line such as `convention: modified` or `# convention: modified`.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
@@ -66,7 +65,7 @@ _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
     "standard": r"\b(?:standard|classic(?:al)?|distal|paul(?:'s)?)\b",
 }
-#: Names and convention in the title of a printed table.
+#: The names and the convention in the title of a table that urdfkin prints.
 _TITLE = re.compile(
     r"^(?:.*\bparameters of )?(?:\*\*)?(?P<robot>.+?)(?:\*\*)?[:,] (?P<base>.+?) to (?P<tip>.+?),"
     r" (?P<convention>standard|modified) "
@@ -86,8 +85,8 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             break
     else:
         raise _missing_header_error(lines)
-    # A title such as "robot: ..." looks like a setting.
-    # Therefore, titles are removed before the settings are read.
+    # If a robot has the name "robot", the title begins with "robot:" and looks like a setting. Therefore,
+    # titles are removed before the settings are read.
     without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
     data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
     if "convention" not in data and (convention := _find_convention(grid)):
@@ -98,7 +97,7 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             data = names | data
     for end in ("base", "tool"):
         if end not in data and (pose := _parse_pose(end, grid.other_lines)):
-            # A printed pose is always in metres.
+            # A printed pose is always in metres, even if the table is in millimetres.
             in_millimetres = parse_units(lengths=data.get("lengths", "metres")).uses_millimetres
             data[end] = [[*row[:3], row[3] * 1e3 if in_millimetres else row[3]] for row in pose]
     data["rows"] = [_parse_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
@@ -348,7 +347,7 @@ def _find_convention(grid: _Grid) -> str | None:
     """A heading with the index i-1 means "modified"."""
     if any(column.previous for column in grid.columns):
         return "modified"
-    # A name such as "distal" must not select a convention.
+    # Below a title, a name such as "distal" must not select a convention.
     if title := next(filter(None, map(_TITLE.search, grid.other_lines)), None):
         return title["convention"]
     text = "\n".join(map(to_plain_text, grid.other_lines))
@@ -383,7 +382,7 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _parse_coordinate_names(lines: list[str]) -> list[str]:
-    """Parse a line such as `with q1 = left, q2 = right`. LaTeX writes `$q_{1}$`."""
+    """Parse a line such as `with q1 = left, q2 = right`, or `with $q_{1}$ = left` in LaTeX."""
     plain = (
         re.sub(r"\$q_\{([0-9]+)\}\$ = ", r"q\1 = ", line.removeprefix(r"  \par\medskip ")) for line in lines
     )
@@ -462,7 +461,7 @@ def _unescape(name: str) -> str:
 
 
 def _nest_row(row: dict[str, Any], units: Mapping[str, str | None], where: str) -> dict[str, Any]:
-    """Without a mimic rule, add the offset to theta or d."""
+    """Nest the entries of a mimic rule and of limits; without a mimic rule, add the offset to theta or d."""
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("mimicked_joint", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
@@ -491,7 +490,7 @@ def _add_offset(row: dict[str, Any], offset: str, units: Mapping[str, str | None
 def _replace_mimic_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace another joint's variable by a mimic rule.
 
-    Variable qi belongs to the i-th joint in `coordinates`. If `coordinates` is empty, qi belongs to row i.
+    Variable qi belongs to the i-th joint in `coordinates`, or to row i if `coordinates` is empty.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -525,7 +524,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a source is a table file. A .txt file that begins with "<" is a URDF."""
+    """Return whether a source is a table file; a .txt file that begins with "<" is a URDF."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
     if (
@@ -553,7 +552,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table or a product of exponentials. Only a product of exponentials has the key M."""
+    """Read a table, or a product of exponentials if the file has the key M."""
     data = read_mapping(path)
     return (
         _add_place(screws_from_mapping, data, str(path)) if "M" in data else parse_table_data(data, str(path))
@@ -642,7 +641,7 @@ def suggest_published_tables(robot: str) -> list[str]:
 
 
 def reference_path(name: str) -> Path:
-    """`name` is a path or a published table's name."""
+    """Return the path of a table; `name` is a path or the name of a published table."""
     path, files = Path(name), published_tables()
     if not name:
         raise SourceError("the path is empty", remedy=f"give a file, or one of {', '.join(files)}")

@@ -1,4 +1,4 @@
-"""Make tables from handwritten rows in Python, TOML, JSON or CSV.
+"""Make tables from handwritten rows in Python, TOML, JSON or CSV, in the units that the data state.
 
 All formats are converted to the same mapping:
 
@@ -57,7 +57,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys without effect on a table's numbers.
+#: Keys of a table that have no effect on its numbers.
 _NOTE_KEYS = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
 _MAPPING_REMEDY = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
@@ -74,7 +74,7 @@ class NumberWithText(float):
 
 
 def half_digits_by_row(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return half a unit of each cell's last digit, in m or rad.
+    """Return half a unit of each cell's last digit (m or rad), by row.
 
     `data` must be a result of `urdfkin.dh.parse_table.mapping_from_text`.
     """
@@ -93,7 +93,7 @@ def _half_digit_in_si(name: str, value: object, units: Units) -> float:
 
 
 def half_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Return half a unit of a number's last digit. An exact number gives 0.
+    """Return half a unit of a number's last digit; 0 for an exact number.
 
     A whole number is exact unless `whole_is_rounded`.
 
@@ -139,7 +139,7 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_column_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles are usually multiples of 15 degrees or of pi/12. Nonzero lengths are rarely such multiples.
+    Angles are usually multiples of 15 degrees or of pi/12. Lengths other than 0 rarely are.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_list_form(row) for row in lists):

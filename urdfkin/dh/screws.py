@@ -2,10 +2,10 @@
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose in the zero configuration. Each joint has a screw (w, v), with the **angular part first**.
-The book Modern Robotics and its code use the same order. For a revolute joint through p, w is the unit axis
-and v = p x w. For a prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame.
-Body screws B = Ad(M^-1) S are in the tip frame.
+M is the tip's pose in the zero configuration. Each joint has a screw (w, v), with the **angular part first**,
+as in the book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w.
+For a prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame. Body screws
+B = Ad(M^-1) S are in the tip frame.
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten axis lengths and pitches (m/rad).
-#: The tolerance also applies to R R^T - I.
+#: Tolerance of handwritten numbers: the length of an axis, a pitch (m/rad), and the entries of R R^T - I.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -179,7 +178,7 @@ class ProductOfExponentials(Displayable):
         """
         return 2.0 * table_roundings(len(self.joints))
 
-    @np.errstate(over="ignore")  # The bound is then inf.
+    @np.errstate(over="ignore")  # After an overflow, the bound is inf.
     def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) of the rounding error of the position (metres).
 

@@ -1,14 +1,14 @@
-"""Snap angles to multiples of 15 degrees, and bound the tip error.
+"""Snap angles to multiples of 15 degrees, and bound the effect on the tip.
 
-An angle is replaced by the nearest multiple of 15 degrees. The change must be at most the tolerance. Three
-kinds of angles are snapped:
+An angle is replaced by the nearest multiple of 15 degrees if the change is at most the tolerance. Three kinds
+of angles are snapped:
 
 1. Roll, pitch and yaw of each joint's origin in the URDF.
 2. The tilt between consecutive axes, and the rotations about these axes.
 3. The theta of each row of the derived table.
 
-A changed angle rotates the rest of the chain about a joint's origin. The tip's displacement is at most this
-angle times the tip's distance.
+A changed angle rotates the rest of the chain about a joint's origin. Therefore, the tip's displacement is at
+most this angle times the distance from the joint's origin to the tip.
 """
 
 from __future__ import annotations
@@ -38,14 +38,13 @@ from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
-#: Largest permitted tolerance, rad.
-#: Below 7.5 degrees, at most one multiple is near enough.
+#: Largest permitted tolerance, rad. With a tolerance below 7.5 degrees, at most one multiple of 15 degrees is
+#: near enough to an angle.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
-#: Sample range (rad, m) of mimicked joints outside the path.
+#: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: Largest noise of a cell.
-#: Unit: rad, or m per m of the table's span.
+#: A deviation of a cell up to this number counts as noise (rad, or m per m of the table's span).
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
@@ -62,7 +61,7 @@ def check_snap_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the snapped chain, and (k, change) of each changed pose A_k."""
+    """Return the snapped chain, and a pair (k, change) for each changed pose A_k."""
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = make_chain(snapped_tree, tip, base)
@@ -87,7 +86,8 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A prismatic axis can be shifted to the previous origin.
+            # The axis of a prismatic joint may have been shifted to the previous joint's origin. This origin
+            # is therefore the pivot.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_make_change(exact, pivot, what, angle), row=i))
@@ -132,7 +132,7 @@ def _coordinate_ranges(table: DHTable) -> dict[str, tuple[float, float]]:
 def largest_travel(table: DHTable, row: DHRow) -> float:
     """Return the largest absolute value (m) of a prismatic joint.
 
-    A mimic joint can exceed its limits although the mimicked joint does not.
+    A mimic joint can leave its own limits while the mimicked joint is within its limits.
     """
     largest = largest_value(row.limit)
     if (rule := row.mimic) is None:
@@ -144,7 +144,7 @@ def largest_travel(table: DHTable, row: DHRow) -> float:
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
     """Return the angles (rad) between rotations (..., 3, 3).
 
-    In the Frobenius norm, `|R - S| = 2 sqrt2 sin(angle / 2)`.
+    The angle satisfies `|R - S| = 2 sqrt2 sin(angle / 2)` in the Frobenius norm.
     """
     chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
@@ -170,8 +170,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Snap roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    # Gimbal lock defines only roll + yaw or roll - yaw.
-    # Therefore, roll is set to 0.
+    # In gimbal lock, only roll + yaw or roll - yaw is defined, so roll is set to 0.
     if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
@@ -180,7 +179,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Snap the angles of Rz(phi) Rx(tilt) Rz(psi). Return the new pose and the change (rad)."""
+    """Snap the angles of Rz(phi) Rx(tilt) Rz(psi); return the new pose and the change (rad)."""
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
@@ -234,13 +233,13 @@ def _changes_of_origins(
 
 
 def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Describe a rotation of the rest of the chain about joint k's origin. The base has k = 0."""
+    """Describe a rotation of the rest of the chain about the origin of joint k (the base has k = 0)."""
     prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the index of A_k's row. The base has the index -1, the tool n."""
+    """Return the index of the row that contains A_k: -1 for the base, n for the tool."""
     n = len(table.rows)
     if k == 0:
         return -1
@@ -252,7 +251,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
 def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
     """Return (joint, cell, deviation) of each noisy cell.
 
-    Noisy angles are near multiples of 15 degrees. Noisy lengths are near 0.
+    A noisy angle is near a multiple of 15 degrees, but not equal to it. A noisy length is near 0, but not 0.
     """
     noisy = []
     for row in table.rows:
@@ -267,7 +266,7 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def travel_condition(table: DHTable) -> str:
-    """Return the condition of a tip displacement bound, or "" without a condition."""
+    """Return the condition of a bound on the tip's displacement, or "" without a condition."""
     condition = "prismatic joints are within their limits"
     if all(row.kind.turns for row in table.rows):
         return ""

@@ -1,8 +1,8 @@
-"""Find the structure of an arm, for closed-form inverse kinematics.
+"""Find the structure of an arm, and export the structure for closed-form inverse kinematics solvers.
 
-Some arms with six revolute joints have a closed-form solution (Pieper, 1968). Three consecutive axes must be
-parallel, or intersect in one point. Distances and angles of consecutive axes do not depend on the
-configuration. The zero configuration therefore suffices.
+Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
+point (Pieper, 1968). The distance and the angle of two consecutive axes do not depend on the configuration.
+Therefore, they are computed in the zero configuration.
 
 An ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et al., 2014) has the standard table
 
@@ -35,11 +35,11 @@ from urdfkin.model.configuration import joint_value_range, largest_value, sample
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
-#: Maximum deviations (rad, m) of a reported property.
+#: A property is reported if its deviation is at most this angle (rad) and this length (m).
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
-#: Maximum deviation (rad, m) of an exact property.
+#: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Smaller singular values count as zero. Rounding errors are much smaller.
+#: Singular values below this number count as zero. Their rounding errors are much smaller.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
 #: Default tolerance of `find_opw` (metres and rad).
@@ -74,8 +74,7 @@ class StructureKind:
     Attributes:
         radians: Largest deviation of an angle.
         metres: Largest deviation of a length.
-        at: Centre (m) of a spherical wrist, shoulder or joint.
-            The centre is in the base frame and the zero configuration.
+        at: Centre (m) of a spherical wrist, shoulder or joint, in the base frame and the zero configuration.
             For other properties, the centre is None.
     """
 
@@ -214,7 +213,7 @@ def _find_arm_kinds(
 
 
 def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the closed-form solvers for the arm. Approximate properties count as exact."""
+    """Return the closed-form solvers for the arm, as if its approximate properties were exact."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:
@@ -232,8 +231,8 @@ def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPai
         ik_geo = f", ik-geo's spherical{suffix}" if "spherical wrist" in names else ""
         solutions.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in names:
-        # ik-geo's `three_parallel` requires parallel axes 2, 3 and 4.
-        # `_two_intersecting` also requires that axes 5 and 6 intersect.
+        # ik-geo's solvers for three parallel axes require that axes 2, 3 and 4 are parallel. The solver with
+        # the suffix _two_intersecting also requires that axes 5 and 6 intersect.
         ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if intersect[4] else ''}"
         solvers = ["EAIK"] * any(intersect) + [ik_geo] * (parallel[1] and parallel[2])
         if solvers:
@@ -262,8 +261,8 @@ def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Bound the distance between `origin` and the tip.
 
-    The bound is the length of a polyline, plus the prismatic joints' travel. The polyline leads from `origin`
-    to the tip. Each revolute axis has a corner: the point nearest to the previous corner.
+    The bound is the length of a polyline from `origin` to the tip, plus the travel of the prismatic joints.
+    The polyline has a corner on each revolute axis, at the point nearest to the previous corner.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -278,7 +277,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return sampled tip positions, and the Jacobian at the first sample. Mimic rules are ignored."""
+    """Return sampled tip positions, and the Jacobian at the first sample; mimic rules are ignored."""
     ranges = [joint_value_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
@@ -303,10 +302,7 @@ class OpwParameters:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return the tip's pose `base F(sign * q - offset) tool`.
-
-        F is the solver's forward kinematics.
-        """
+        """Return the tip's pose `base F(sign * q - offset) tool`; F is the solver's forward kinematics."""
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
@@ -338,7 +334,8 @@ class OpwParameters:
 def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameters:
     """Find the OPW parameters.
 
-    `tolerance` is the largest error of an entry of the tip's pose. Entries of the position are in m.
+    `tolerance` is the largest permitted error of an entry of the tip's pose. Entries of the position are in
+    m.
 
     Raises:
         InputError: the arm does not have six revolute joints, or no parameters are within the tolerance.
@@ -378,7 +375,7 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
 
 
 def _opw_candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield an OPW table for each choice of signs of a1, a2, b. The lengths are approximate."""
+    """Yield an OPW table with approximate lengths for each choice of the signs of a1, a2 and b."""
     rows = derive(path, DerivationOptions(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
@@ -400,26 +397,25 @@ def _read_parameters(table: DHTable) -> OpwParameters:
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
     offsets = (angle_difference(zero, row.theta) + 0.0 for zero, row in zip(_THETA, rows, strict=True))
     names, signs = tuple(row.joint for row in rows), tuple(row.sense for row in rows)
-    # In an OPW table, X_6 is the identity.
+    # The last row of an OPW table has a = 0 and alpha = 0, so X_6 is the identity.
     tool = table.tool if is_identity(rows[5].X) else rows[5].X @ table.tool
     return OpwParameters(names, lengths, tuple(offsets), signs, table.base, tool)
 
 
 def axes_and_connecting_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the axes h_i (n, 3) and the vectors P_i (n + 1, 3), m.
+    """Return the axes h_i (n, 3) and the vectors P_i (n + 1, 3), m, of an arm with revolute joints.
 
-    All joints must be revolute. Intersecting axes share a point if possible. Solvers test whether a vector is
-    exactly zero.
+    Intersecting axes share a point if possible, because solvers test whether a vector is exactly zero.
     """
     points = np.vstack([np.zeros(3), _choose_axis_points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
 
 
 def _choose_axis_points(screws: ProductOfExponentials) -> FloatArray:
-    """Return a point of each axis.
+    """Return a point of each axis; consecutive axes that intersect share a point if possible.
 
-    Intersecting consecutive axes share a point if possible. Intersections of three axes have priority over
-    intersections of two axes. Later intersections have priority over earlier ones.
+    Intersections of three axes have priority over intersections of two axes. Later intersections have
+    priority over earlier ones.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

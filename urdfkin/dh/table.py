@@ -1,6 +1,6 @@
-"""Define the Denavit-Hartenberg table: rows, base and tool.
+"""Define the Denavit-Hartenberg table: rows, base and tool, in the standard or the modified convention.
 
-A table is a product of two kinds of transforms (textbook, section 7.5):
+A table represents a product of two kinds of transforms (section 7.5 of the textbook):
 
     S = Rz(theta) Tz(d)              rotation about a joint's axis, and translation along this axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
@@ -11,9 +11,9 @@ The two conventions group these transforms differently into rows:
     modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool
 
 Row i contains S_i and one X: X_i in a standard table, X_{i-1} in a modified table. The variable of row i is
-theta_i (revolute joint) or d_i (prismatic joint). The variable's value is the row's constant plus `sense`
-times the joint's value. The textbook uses the standard convention. The axis of joint i is z_{i-1}, and
-d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable is the constant in the
+row plus `sense` times the joint's value. The standard convention is the textbook's: z_{i-1} is the axis of
+joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 """
 
 from __future__ import annotations
@@ -155,10 +155,10 @@ class DHRow:
 
     @property
     def distance_to_normal(self) -> float:
-        """Distance (m) between the row's x axis and the end of the common normal.
+        """Distance (m), along the next axis, between the row's x axis and the end of the common normal.
 
-        The distance is along the next axis. Only a Hayati row has a nonzero distance. With the angle `tilt`
-        between the two joint axes, the distance is:
+        Only a Hayati row has a nonzero distance. With the angle `tilt` between the two joint axes, the
+        distance is:
 
         `|a sin(beta)| / sin^2(tilt)`
 
@@ -190,9 +190,9 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: Maximum deviation of a round angle, divided by 15 degrees.
+#: Largest distance between a round angle and a multiple of 15 degrees, as a fraction of 15 degrees.
 _ROUND_TOLERANCE = 1e-3
-#: Tolerance of handwritten rotation matrices, often with seven digits.
+#: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6
 
 
@@ -213,7 +213,7 @@ def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
 
 
 def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
-    """Return X = Tx(a) Rx(alpha) Ry(beta). The units are metres and radians."""
+    """Return X = Tx(a) Rx(alpha) Ry(beta), with a in metres and both angles in radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
         [

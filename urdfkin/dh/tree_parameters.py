@@ -1,17 +1,18 @@
 """Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame. The axis z_j is the axis of joint j. Joint j moves link j. The antecedent of link j is
-the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this pose in
-frame i:
+link j has one frame. The axis z_j of the frame is the axis of joint j, which moves link j. The antecedent of
+link j is the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this
+pose in frame i:
 
 `T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r)`
 
-The axis x_i is along the common normal of two axes. These axes belong to link i and its first moving child.
-Therefore, gamma and b of the first moving child are zero.
+The axis x_i is along the common normal of two axes: the axis of link i, and the axis of its first moving
+child. Therefore, gamma and b of the first moving child are zero.
 
-Without branches, the table has the form of the modified Denavit-Hartenberg table. The modified table writes
-a(i-1) instead of d, and d(i) instead of r. Frame 0, the last row and parallel axes are exceptions.
+For a chain without branches, the table has the form of the modified Denavit-Hartenberg table. The modified
+table writes a(i-1) instead of d, and d(i) instead of r. Frame 0, the last row and parallel axes are
+exceptions.
 
 The original notation has no angle beta. In this table, beta is zero unless two axes are nearly parallel.
 Without beta, nearly parallel axes may need offsets of kilometres (Hayati).
@@ -58,7 +59,7 @@ class TreeRow:
     The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Row index of the antecedent, from 0. The root has the index -1.
+        antecedent: Row index of the antecedent, from 0, or -1 for the root.
         sigma: 0 for a revolute, 1 for a prismatic and 2 for a fixed joint.
         mimicked_joint: The mimicked joint, or the joint itself without a mimic rule.
         multiplier: Multiplier of the mimic rule.
@@ -85,7 +86,7 @@ class TreeParameters:
     """The table of a whole robot.
 
     Attributes:
-        path_lengths: (joints,) lengths (m) in the URDF from the root to the joint origins.
+        path_lengths: (joints,) path lengths (m) from the root to the joint origins in the URDF.
         T_frame_link: (joints, 4, 4) poses of the URDF link frames in the rows' frames.
         zeroed_tilt: Largest sum (rad) of the zeroed tilts along a path from the root.
     """
@@ -106,7 +107,7 @@ class TreeParameters:
     def roundings(self) -> float:
         """Estimated rounding error of a pose, as a multiple of eps * reach.
 
-        The estimate is not a proven bound. Pinocchio's rounding errors are not included.
+        The estimate is not a proven bound, and does not include Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS
@@ -151,7 +152,7 @@ class TreeParameters:
         return values
 
     def placements(self, q: ArrayLike) -> FloatArray:
-        """Return the poses of all links. `q` has the order of `coordinates`.
+        """Return the poses of all links; the numbers in `q` have the order of `coordinates`.
 
         Returns:
             (..., joints, 4, 4) poses of the URDF link frames in the root frame.
@@ -212,7 +213,7 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
 class _LinkAxis:
     """The axis frame of a link.
 
-    `zeroed_tilt` is the sum (rad) of zeroed tilts from the root.
+    `zeroed_tilt` is the sum (rad) of the zeroed tilts along the path from the root.
     """
 
     antecedent: int
@@ -223,12 +224,10 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return the axis frame of each link. A link with a fixed joint has its URDF frame."""
+    """Return the axis frame of each link, or the link's URDF frame if the link's joint is fixed."""
     links = list[_LinkAxis]()
-    # An entry contains an index i, T_i_link and a count.
-    # The count contains the fixed joints after link i.
-    # For a moving link, i is the link's own index.
-    # For any other link, i is the antecedent's index.
+    # Each entry is an index i, the pose T_i_link, and the number of fixed joints from link i to the link. For
+    # a moving link, i is the link's own index. For all other links, i is the antecedent's index.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -262,8 +261,7 @@ def _find_transforms(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
-    # If no moving link follows, x can have any direction.
-    # The choice below makes theta 0.
+    # If no moving link follows a link, the direction of x is free. This choice of x makes theta 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)
@@ -311,7 +309,7 @@ _FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), 
 
 
 def as_mapping(table: TreeParameters) -> dict[str, Any]:
-    """Return plain data (m, rad). Row numbers begin at 1. The root has the number 0."""
+    """Return plain data (m, rad); row numbers begin at 1, and 0 is the root."""
     return {
         "notation": "Khalil-Kleinfinger",
         "robot": table.robot,
@@ -334,7 +332,7 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
-    # A mimic joint's constant includes the mimic rule's offset.
+    # The constant in a mimic joint's cell is the sum of the row's constant and the mimic rule's offset.
     variable = (
         f"q({row.mimicked_joint})"
         if row.mimicked_joint == row.joint

@@ -3,8 +3,8 @@ r"""Convert a table's numbers from text and to text.
 A table object stores metres and radians. Other units are used only when a table is read or written.
 
 The text of a cell is a sum. Examples are `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` and `180°`.
-A term is a number, or a multiple of pi or of a variable. A number or a multiple of pi can have a unit. A cell
-may contain at most one term with a variable.
+A term is a number, a multiple of pi, or a multiple of a joint variable. A number or a multiple of pi can have
+a unit. A cell may contain at most one term with a variable.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class LengthUnit(StrEnum):
     MILLIMETRES = "millimetres"
 
 
-#: A row that is a list has this order.
-#: Craig's book uses the order alpha, a, d, theta. The Robotics Toolbox uses theta, d, a, alpha.
+#: A row that is a list has its cells in this order. Craig's book uses the order alpha, a, d, theta. The
+#: Robotics Toolbox uses theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
 _MAX_CELL_LENGTH = 200
@@ -125,7 +125,7 @@ def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an angle as a fraction of pi. None: not exactly a multiple of pi/12."""
+    """Return an angle as a fraction of pi, or None if it is not exactly a multiple of pi/12."""
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 
@@ -288,7 +288,7 @@ class _Term:
     units: tuple[str, ...] = ()
     has_pi: bool = False
     text: str = ""
-    operator: str = ""  # "*" or "/" without its second operand.
+    operator: str = ""  # A "*" or "/" that has no second operand yet.
 
     @property
     def value(self) -> float:

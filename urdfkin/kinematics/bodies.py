@@ -1,4 +1,4 @@
-"""Motion of planar links, moving points and frames, joints and tools; analytical Jacobians.
+"""Compute the motion of planar links, moving points and frames, joints and tools, and analytical Jacobians.
 
 The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook.
 
@@ -33,7 +33,7 @@ for J is analytical Jacobian.
 | rotation matrix | a matrix that is not a rotation |
 
 An unknown `representation` raises UnknownNameError. Functions with the argument `nearest` raise
-RepresentationSingularityError within this distance of the singularity.
+RepresentationSingularityError within this distance of the singularity of Euler angles.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """Terms w x p, R v_1 and d-dot of a point's velocity (7.124), m/s."""
+    """The three terms w x p, R v_1 and d-dot of a point's velocity (7.124), in m/s."""
 
     rotation: FloatArray
     relative: FloatArray
@@ -187,7 +187,7 @@ def point_acceleration(
 
     With p = R p_1, the acceleration is:
 
-    `alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot`.
+    `alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot`
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))

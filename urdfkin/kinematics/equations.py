@@ -1,13 +1,9 @@
 """The textbook's equations of motion (sections 7.3 to 7.7) for many kinds of numbers.
 
-A vector is a triple of numbers (x, y, z). A rotation is a triple of rows. The module imports nothing, because
-the equations use the arithmetic of their arguments. Each equation is written only once.
-
-| Kind of number | Example |
-|---|---|
-| floats | batches in vector registers, NumPy arrays |
-| exact or bounded | numbers with 50 digits, intervals, lengths of vectors |
-| text | LaTeX expressions |
+A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
+because the equations use the arithmetic of their arguments. Therefore, each equation is written only once.
+The kinds of numbers are batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths
+of vectors, and LaTeX expressions.
 
 For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the functions of the
 section "vectors".
@@ -25,12 +21,12 @@ section "vectors".
 | `o`, `u` | angular and linear velocity of a planar or floating joint |
 | `b` | time derivatives of the components of o or u |
 
-All vectors of an equation are expressed in the same axes. The axes are the world's axes or the link's own
-axes. The textbook uses the world's axes. In the link's own axes, z and an `<origin>`'s offset are constant.
+All vectors of an equation are expressed in the same axes. These are the world's axes, as in the textbook, or
+the link's own axes. In the link's own axes, z and the offset of an `<origin>` are constant.
 
 The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
-and follows joint i. In a URDF, a joint's frame lies on the joint's own axis. The `<origin>` of joint i
-contains an offset. The offset belongs to link i-1 and precedes joint i. The two numberings give the same
+and follows joint i. In a URDF, the frame of a joint lies on the joint's own axis. The `<origin>` of joint i
+in a URDF contains an offset that belongs to link i-1 and precedes joint i. Both numberings give the same
 sums.
 """
 
@@ -191,9 +187,9 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 # -- planar and floating joints -----------------------------------------------------------------------
-# The joint's velocity is expressed in the next link's axes.
-# The vector b contains time derivatives of the velocity's components.
-# The next link's axes have the angular velocity w + o.
+# The joint's velocity is expressed in the axes of the link after the joint. The vector b contains the time
+# derivatives of the joint velocity's components. The axes of the link after the joint rotate with the angular
+# velocity w + o.
 
 
 def free_angular_acceleration(alpha, w, o, b):
@@ -237,7 +233,7 @@ def rate_in_turning_axes(rate, w, x):
 
 
 # -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
-# Time derivative of column i, a sum over joints (7.126):
+# The time derivative of column i is a sum over all joints j (7.126):
 #     `d(column i)/dq_j * v_j`
 
 

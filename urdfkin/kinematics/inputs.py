@@ -13,19 +13,18 @@ from urdfkin.system.lazy_import import is_instance
 
 FloatArray = NDArray[np.float64]
 
-#: Largest accepted deviation of a unit vector's norm from 1.
-#: Normalised vectors deviate by at most 4e-16 in double precision.
-#: Vectors with only six digits do not give rotation matrices.
+#: Largest accepted deviation of a unit vector's norm from 1. A vector that is normalised in double precision
+#: deviates by at most 4e-16. For a vector with only six digits, the rotation formulas give a matrix that is
+#: not a rotation.
 UNIT_TOLERANCE = 1e-12
-#: Largest accepted entry of |R R^T - I| for rotations R.
-#: Nine-decimal rounding changes the entries by at most 5e-10.
-#: In each row, the sum of |entry| is at most sqrt(3).
-#: |R R^T - I| <= 2 * 5e-10 * sqrt(3), about 1.73e-9.
+#: Largest accepted absolute entry of R R^T - I for a rotation matrix R. If R is rounded to nine decimals,
+#: every entry of R has an error of at most 5e-10. An entry of R R^T is the dot product of two rows of R. The
+#: absolute values of the entries in a row of R sum to at most sqrt(3). Therefore, an entry of R R^T - I is at
+#: most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: Values of NumPy's `dtype.kind` for unaccepted data.
-#: c: complex, S: bytes, U: text.
-#: m: timedelta, M: datetime, V: void.
-#: NumPy would convert dates and the text "1.5" to floats.
+#: Values of NumPy's `dtype.kind` for data that are not real numbers. The letters mean complex (c), bytes (S),
+#: text (U), timedelta (m), datetime (M) and void (V). For example, NumPy converts dates and the text "1.5" to
+#: floats without reporting an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
@@ -39,8 +38,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
-        # NumPy would convert text in an object array to numbers.
-        # NumPy would convert None to NaN.
+        # Without this check, NumPy would convert text in an object array to numbers, and None to NaN.
         if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
@@ -62,14 +60,14 @@ def _is_masked(value: object) -> bool:
 
 
 def check_range(result: FloatArray) -> FloatArray:
-    """Return the result of a computation. Raise RangeError if the result is not finite."""
+    """Return the result of a computation; raise RangeError if one of its numbers is not finite."""
     if not np.isfinite(result).all():
         raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
     return result
 
 
 def common_batch_shape(shapes: Iterable[tuple[int, ...]], what: str = "the arguments") -> tuple[int, ...]:
-    """Return the shape to which batch shapes broadcast. `what` names them in an error message."""
+    """Return the shape to which batch shapes broadcast. `what` names the arrays in the error."""
     shapes = list(shapes)
     try:
         return np.broadcast_shapes(*shapes)
@@ -124,7 +122,7 @@ def as_matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) ->
     return array
 
 
-@np.errstate(over="ignore")  # The norm is then inf.
+@np.errstate(over="ignore")  # After an overflow, the norm is inf.
 def as_unit_vectors(value: ArrayLike, name: str) -> FloatArray:
     array = as_vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))

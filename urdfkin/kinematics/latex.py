@@ -12,8 +12,8 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: Parameter name in `equations` -> LaTeX symbol of the textbook.
-#: Without an entry, the parameter name is the LaTeX symbol.
+#: LaTeX symbol of the textbook for each parameter name in `equations`. If a parameter has no entry, its name
+#: is the LaTeX symbol.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -28,8 +28,8 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: Function name -> LaTeX symbols for the function's parameters.
-#: These symbols override `_SYMBOLS`.
+#: LaTeX symbols that apply only to the parameters of one function, by function name. These symbols override
+#: `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
@@ -115,7 +115,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Convert a term, a tuple of terms, or a tuple of rows to LaTeX."""
+    """Return a term, column (tuple of terms) or matrix (tuple of rows) as LaTeX."""
     if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

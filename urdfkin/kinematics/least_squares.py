@@ -15,17 +15,15 @@ State = TypeVar("State")
 Intermediate = TypeVar("Intermediate")
 
 _MOST_STEPS = 100
-#: First, smallest and largest damping / largest singular value.
+#: First, smallest and largest damping, as multiples of the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: Factors of the damping after accepted and rejected steps.
+#: Factors of the damping after an accepted step and after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: Slow steps: `new error > _SLOW_STEP_RATIO * old error`.
+#: A step is slow if the new error is more than this fraction of the old error.
 _SLOW_STEP_RATIO = 0.99
-#: Minimum relative reduction of the squared error per step.
-#: The iteration ends below this reduction.
+#: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: Relative rounding error of the norm <= `_NORM_ROUNDING * n * eps`.
-#: Here n is the number of residuals.
+#: The norm of n residuals has a relative rounding error of at most `_NORM_ROUNDING * n * eps`.
 _NORM_ROUNDING = 4.0
 
 
@@ -44,11 +42,11 @@ def least_squares(
 
     Args:
         start: First state.
-        residuals: Computes the residuals (n,) of a state, and a value for `derivatives`.
+        residuals: Computes the residuals (n,) of a state, and a value that is passed to `derivatives`.
         derivatives: Computes the negative derivatives (n, parameters) of the residuals.
         move: Applies a step (parameters,) to a state and returns the new state.
         max_step: Upper bound on the absolute value of each component of a step.
-        patience: The search ends after this number of consecutive slow steps. If 0, there is no limit.
+        patience: The search ends after this number of consecutive slow steps. 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

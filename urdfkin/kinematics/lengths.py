@@ -1,7 +1,7 @@
 """Compute upper bounds on the lengths of a link's position, velocities and accelerations.
 
-Each function computes a link's bounds from the parent link's bounds. A bound is at least the sum of the norms
-of all terms:
+Each function computes the bounds of a link from the bounds of the parent link. A bound is at least the sum of
+the norms of all terms:
 
 | Symbol | Vector or number |
 |---|---|
@@ -18,7 +18,7 @@ NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) 
 from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
-#: Bounds of a link's p, w, vel, alpha and acc.
+#: Bounds of a link's position p, angular velocity w, velocity vel, and accelerations alpha and acc.
 LinkBounds = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 

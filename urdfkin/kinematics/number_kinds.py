@@ -1,11 +1,11 @@
-"""Two versions of the textbook's equations, for results and for bounds on results.
+"""Two versions of the textbook's equations: one computes results, the other bounds the results.
 
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
-vector. One call computes a whole batch.
+vector, so one call computes a whole batch.
 
-`length_equations` computes the scale of a result. The scale is an upper bound on the sum of |term|. No term,
-no partial sum and no result is larger than the scale. Rounding errors are proportional to the scale. The
-result can be much smaller than the scale, because large terms can cancel.
+`length_equations` computes the scale of a result: an upper bound on the sum of the absolute values of its
+terms. The scale is at least as large as every term, every partial sum and the result. Rounding errors are
+proportional to the scale. The result can be much smaller than the scale, because large terms can cancel.
 
 | Result | Scale |
 |---|---|
@@ -44,8 +44,7 @@ array_equations = bind_equations(
     product=np.matmul,
 )
 
-#: The length of a vector.
-#: A float, or an array with one number per configuration.
+#: The length of a vector: a float, or an array with a number for each configuration.
 Length = Any
 
 
@@ -75,18 +74,14 @@ def magnitude(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths (...) of vectors (..., n).
-
-    The length of a nonzero vector is at least `SMALLEST_NORMAL`.
-    """
+    """Return the lengths (...) of vectors (..., n), at least `SMALLEST_NORMAL` for nonzero vectors."""
     return magnitude(
         np.hypot.reduce(x, axis=-1)
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: For each equation, a function that returns the result's scale.
-#: The arguments are vector lengths and absolute values.
-#: Arguments that are arrays follow NumPy's broadcasting rules.
+#: For each equation, a function that returns the scale of the result. The arguments are lengths of vectors
+#: and absolute values of numbers. Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,
     minus=add,

@@ -1,4 +1,4 @@
-"""Rotation matrices, quaternions and Euler angles of rigid bodies, and their time derivatives.
+"""Rotations of rigid bodies, and the time derivatives of rotation matrices, quaternions and Euler angles.
 
 The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 
@@ -23,10 +23,10 @@ The dots stand for any batch shape. Results have the batch shape of the argument
 | `frame` | an unknown name |
 
 A user's matrix often has only a few digits. Quaternions, Euler angles and Gram-Schmidt give different
-rotations for the same rounded matrix. `nearest_rotation` and `polar_factor` return the rotation nearest to a
-matrix M. The distance is the Frobenius norm. `nearest_rotation` requires small errors, and `polar_factor`
-accepts errors of any size. The nearest rotation is unique. In the polar decomposition M = U H, the nearest
-rotation is U.
+rotations for the same rounded matrix. `nearest_rotation` and `polar_factor` return the rotation that is
+nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors, and `polar_factor`
+accepts errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar
+decomposition M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration. The scalar qw is the textbook's
 q0. A quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
@@ -97,7 +97,7 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ as_matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: Maximum entry of |M - nearest rotation| for an unchanged M.
+#: A matrix is used unchanged if no entry differs from the nearest rotation by more than this number.
 UNCHANGED_MATRIX_TOLERANCE = 1e-15
 
 
@@ -197,7 +197,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
 NORM_TOLERANCE = 1e-6
 
 
-@np.errstate(over="ignore")  # The norm is then inf.
+@np.errstate(over="ignore")  # After an overflow, the norm is inf.
 def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
     quat = as_vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
@@ -223,7 +223,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
     Shepperd's method avoids cancellation.
     """
     R = as_rotations(R, "R")
-    # The rows of `K = 4 q q^T` are multiples of q.
+    # Each row of K = 4 q q^T is a multiple of q.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -344,7 +344,7 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """
     axis = as_unit_vectors(axis, "axis")
     angle = as_finite(angle, "angle")[..., np.newaxis, np.newaxis]
-    # 1 - cos(phi), without cancellation for small phi.
+    # This formula of 1 - cos(phi) has no cancellation for small phi.
     versine = 2.0 * np.sin(angle / 2.0) ** 2
     outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
     return np.eye(3) * np.cos(angle) + outer * versine + skew(axis) * np.sin(angle)
@@ -448,7 +448,7 @@ class EulerSequence:
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Convert between the order of `name` and the order first, second, third."""
+        """Convert the last axis between the order of `name` and the order first, second, third."""
         return values[..., ::-1] if self.is_fixed else values
 
 
@@ -504,8 +504,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     | other | [-pi/2, pi/2] |
 
     At the singularity, only the sum or difference of the first and third angle is determined. For moving
-    axes, the first angle is arbitrary. For fixed axes, the third angle is arbitrary. The remaining angle
-    follows from the arbitrary angle. For exact entries of R, the arbitrary angle is 0.
+    axes, the first angle is arbitrary, and the third angle follows from the first angle. For fixed axes, the
+    third angle is arbitrary, and the first angle follows from the third angle. For exact entries of R, the
+    arbitrary angle is 0.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.
@@ -516,12 +517,11 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # F, S and T are rotations about the three axes.
-    # R = F S T, so F^T R = S T.
-    # S rotates about axis `j`, so (S T)[j] = T[j].
+    # F, S and T are rotations about the three axes. R = F S T, so F^T R = S T. S is a rotation about axis
+    # `j`. Therefore, row `j` of S T is row `j` of T.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # Only row[j] and row[rest] can be nonzero.
+    # Only the entries `j` and `rest` of this row can be nonzero.
     rest, sense = (m, sign) if axes.is_proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.reorder(np.stack((first, second, third), axis=-1)).copy()
@@ -540,8 +540,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Minimum distance (rad) from the singularity for Euler angle rates.
-#: Nearer to the singularity, rates have too few correct digits.
+#: At this distance (rad) or less from the singularity, Euler angle rates have too few correct digits.
 MIN_SINGULARITY_DISTANCE = 1e-9
 
 
@@ -622,10 +621,10 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     """Return the condition number of Omega, cot(d / 2).
 
-    The angle d in [0, pi/2] is between the lines of the first and the third rotation axis. The second axis is
-    perpendicular to the two other axes. Therefore, Omega has these singular values:
+    The angle d is the angle between the lines of the first and the third rotation axis, from 0 to pi/2. The
+    second axis is perpendicular to both. Therefore, Omega has these singular values:
 
-    `1, sqrt(1 + cos d), sqrt(1 - cos d)`.
+    `1, sqrt(1 + cos d), sqrt(1 - cos d)`
 
     At the singularity, d is 0, and the function raises RepresentationSingularityError.
     """

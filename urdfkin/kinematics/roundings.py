@@ -4,9 +4,9 @@ All tolerances of urdfkin use these bounds:
 
 `tolerance = count * eps * scale`
 
-The number eps is 2^-52. The error of one operation is at most eps/2 times the rounded number. The result is a
-sum of terms. The scale is an upper bound on the sum of |term|. This module defines the counts, to first order
-in eps.
+The number eps is 2^-52. The error of one operation is at most eps/2 times the rounded number. The scale is an
+upper bound on the sum of the absolute values of the result's terms. This module defines the counts, to first
+order in eps.
 
 | Scale | Module |
 |---|---|
@@ -194,7 +194,7 @@ The counts, with u = eps/2, are
 
 **MJCF equalities.** The tree's mimic rules satisfy an equality in an MJCF file up to rounding:
 
-`y - y0 = c0 + c1 (x - x0)`.
+`y - y0 = c0 + c1 (x - x0)`
 
 The numbers x and y are the values of two joints. The numbers x0 and y0 are reference values.
 
@@ -211,8 +211,8 @@ With k mimic rules between the mimic joint and the independent joint, the tolera
 `MJCF_MIMIC_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)`
 
 **Numbers near zero.** Let n = 2^-1022 be the smallest normal number. A product below n loses bits. The
-smallest subnormal number is eps n. The error of the product is at most eps n / 2. Every nonzero scale is at
-least n (`urdfkin.kinematics.number_kinds`). Therefore, the tolerance is larger than the error:
+smallest subnormal number is eps n, so the error of the product is at most eps n / 2. Every nonzero scale is
+at least n (`urdfkin.kinematics.number_kinds`). Therefore, the tolerance is larger than this error:
 
 `count * eps * scale >= count * eps n > eps n / 2`
 
@@ -245,34 +245,29 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: `eps * scale` for the smallest nonzero scale, `SMALLEST_NORMAL`.
+#: `eps * scale` for the smallest nonzero scale, which is `SMALLEST_NORMAL`.
 SMALLEST_SUBNORMAL = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
-#: Allowed difference between urdfkin and Pinocchio, without tilts:
+#: Without tilts, this is the allowed difference between urdfkin and Pinocchio:
 #:     `joints * factors * PINOCCHIO_ROUNDINGS * eps * scale`
-#: `joints` = number of joints of the path + 1.
-#: For a rotated base: number of joints + 2.
-#: `factors` is the number of factors of a term.
-#: Example: w x (w x d) has three factors.
-#: The docstring above derives these rules.
+#: `joints` is the number of joints of the path plus one, or plus two for a rotated base. `factors` is the
+#: number of factors of a term. For example, the term w x (w x d) has three factors. The docstring above
+#: derives these rules.
 PINOCCHIO_ROUNDINGS = 24.0
-#: Allowed difference between urdfkin and MuJoCo:
+#: This is the allowed difference between urdfkin and MuJoCo:
 #:     `joints * factors * MUJOCO_ROUNDINGS * eps * scale`
-#: `PINOCCHIO_ROUNDINGS` defines `joints`.
-#: `factors` is twice the number of factors that `PINOCCHIO_ROUNDINGS` defines.
-#: MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
-#: Therefore, MuJoCo's terms have more factors.
+#: `joints` is the same number as for `PINOCCHIO_ROUNDINGS`. `factors` is twice the number of factors, because
+#: MuJoCo's terms have more factors: MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
-#: Allowed residual (in eps) of an MJCF file's mimic rule.
-#: MuJoCo computes the residual.
+#: Allowed residual (in eps) of a mimic rule in an MJCF file, as computed by MuJoCo.
 MJCF_MIMIC_ROUNDINGS = 8.0
-#: Rounding error (in eps) per row of a Denavit-Hartenberg table.
+#: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW_ROUNDINGS = 8.0
 
-# Rounding errors of exports in single precision (`urdfkin.export.function`).
-# The docstring above derives these errors under "Single precision".
+# Rounding errors of exports in single precision (`urdfkin.export.function`). The section "Single precision"
+# of the docstring above derives these errors.
 
 SINGLE_EPS = 2.0**-23
 #: Smallest normal number and largest number in single precision.
@@ -285,75 +280,59 @@ SINGLE_OPERATION_ERRORS = dict.fromkeys("+-*", 0.5) | {
     "sin": 3.5,
     "cos": 3.5,
 }
-#: Absolute error (in eps) of a polynomial's sine or cosine.
+#: Absolute error (in eps) of a sine or cosine that a polynomial computes.
 SINGLE_POLYNOMIAL_ERROR = 1.0
 
 # Rounding errors between consecutive joint axes.
 # The module `urdfkin.dh.common_normals` uses these numbers.
 
-#: Allowed difference (eps per joint) between two programs' constant poses.
-#: The two programs read the same file.
-#: The largest possible difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
-#: Source: rows 1 and 3 under "A joint".
-#: The standard deviation is 2.4 eps.
-#: The allowed difference is 5.7 standard deviations.
+#: Allowed difference of the constant poses that two programs compute from the same file, in eps per joint.
+#: The largest possible difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps. The four counts are in rows 1 and 3
+#: of the table "A joint" in the docstring above. The standard deviation is 2.4 eps, so the allowed difference
+#: is 5.7 standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
-#: Rounding errors (in eps) of the directions of two axes.
-#: The division of an axis by its length: error 0.5.
-#: Rodrigues' formula: error 2.0.
+#: Rounding errors of the directions of two joint axes, in eps. For each axis, the division by the length has
+#: an error of 0.5, and Rodrigues' formula has an error of 2.0.
 AXIS_ROUNDINGS = 5.0
-#: Error (eps per joint) of the angle between consecutive axes.
-#: Angles in a file are rounded to fifteen digits (DBL_DIG).
-#: The error is half a unit of the last digit.
-#: Up to pi, the error is 5e-15 rad (22.5 eps).
-#: Roll and pitch change the angle between two z axes.
-#: Yaw does not change this angle.
-#: Therefore, the error is twice 22.5 eps.
+#: Error of the angle between consecutive axes, in eps per joint. Angles in a file are rounded. An angle with
+#: fifteen digits (DBL_DIG) has an error of half a unit of its last digit. For angles up to pi, this error is
+#: 5e-15 rad, or 22.5 eps. If both joint axes are z axes, roll and pitch both change the angle between the
+#: joint axes. Yaw does not change this angle. Therefore, the error is twice 22.5 eps.
 FILE_ANGLE_ROUNDINGS = 45.0
-#: Rounding error of a length along a joint axis.
-#: The unit is eps times the path length.
-#: A dot product has an error of 2.4 eps.
-#: The error of a sum is 0.5 eps * sum.
-#: Most sums are much smaller than the path length.
+#: Rounding error of a length along a joint axis, as a multiple of eps times the path length. A dot product
+#: has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum. Few sums of lengths
+#: are nearly as large as the path length.
 LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.
 
-#: Rounding error (eps rad) of an angle in [-pi, pi].
-#: A computed multiple of pi/12 has an error of 1.2.
-#: A value of arctan2 has an error of 1.1.
-#: Rounding a file's angle to a double: error 1.0.
+#: Rounding error (in multiples of eps rad) of an angle between -pi and pi. A computed multiple of pi/12 has
+#: an error of 1.2, and a value of arctan2 has an error of 1.1. The rounding of a file's angle to a double has
+#: an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
-#: Error (in eps) of an entry of a rotation matrix.
-#: An entry is `a x - b y`: error 0.75.
-#: The factors x and y are differences of two products.
-#: Each of these differences has an error of 0.75.
+#: Error (in eps) of an entry of a rotation matrix. An entry is `a x - b y`, and this difference has an error
+#: of 0.75. The factors x and y are differences of two products, also with an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
-#: Maximum change of a length by rounding to twelve digits.
-#: The unit is eps times the path length.
+#: A length is rounded to twelve digits if the change is at most this number times eps times the path length.
 SNAPPED_LENGTH_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
-#: Error (in eps) of the angle between two rotations.
-#: The rotation from roll, pitch and yaw has the error 3.1.
-#: The product of three rotations has the error 4.2.
-#: 0.5 (sines) + 0.5 (cosines) + 1.4 + 1.8 (multiplications) = 4.2.
+#: Error (in eps) of the angle between two rotations. The first rotation is computed from roll, pitch and yaw,
+#: with an error of 3.1 eps. The second rotation is a product of three rotations, with an error of 4.2 eps.
+#: This error is 0.5 for the sines, 0.5 for the cosines, 1.4 for the first product, and 1.8 for the second.
 ROTATION_ROUNDINGS = 8.0
 
-#: Allowed rounding error (in eps) of a mimicked joint's limit.
-#: The mimic joint's limit determines the mimicked joint's limit:
+#: Allowed error (in eps) of a mimicked joint's limit that is computed from a mimic joint's limit:
 #:     `(limit of the mimic joint - offset) / multiplier`
-#: The computation has a subtraction and a division.
-#: The mimic rule has a multiplication and an addition.
-#: The error of each operation is 0.5, the sum 2.0.
-#: The mimicked joint's range is narrowed at its ends.
-#: The narrowing at each end is 4.0, twice the sum.
-#: Therefore, the mimic joint's limits accept the narrowed range.
+#: The computation of the limit has a subtraction and a division. The mimic rule has a multiplication and an
+#: addition. Each of these four operations has an error of 0.5, so the sum is 2.0. urdfkin moves each end of
+#: the mimicked joint's range inwards by 4.0, which is twice the sum. Therefore, the mimic joint's limits
+#: accept both ends of the narrowed range.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference (eps) between urdfkin and Pinocchio, per factor.
+    """Return the allowed difference (eps) between urdfkin and Pinocchio for each factor of a term.
 
-    `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`.
+    `PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps`
 
     The caller counts the joints; `PINOCCHIO_ROUNDINGS` describes the usual count. `tilt` is the sum of the
     tilts (rad) of the path's joints.

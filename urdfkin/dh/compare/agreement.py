@@ -1,4 +1,4 @@
-"""Compare a published table with a URDF: the cells and the tip's pose."""
+"""Compare the cells and the tip's pose of a published table with a URDF."""
 
 from __future__ import annotations
 
@@ -37,26 +37,22 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
-#: Default tolerance (m) at the tip.
-#: The tolerance covers two cells rounded to 0.1 mm.
+#: Default tolerance (m) at the tip. The tolerance covers the effect of two cells that are rounded to 0.1 mm.
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Cell corrections must reduce the tip error to this fraction.
-#: Otherwise, no differing cells are reported.
-#: A tip error up to `NEGLIGIBLE_ERROR` * reach also suffices.
+#: Differing cells are reported if their correction reduces the tip error to at most this fraction. A
+#: remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach also suffices.
 _MAX_CELLS_ERROR_FRACTION = 0.5
-#: Maximum tip error after the correction of a mistake / error before.
-#: A tip error within the tolerance also suffices.
+#: The correction of a mistake must reduce the tip error to the tolerance, or to at most this fraction.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Maximum number of additional differing cells without a fit.
-#: Above this number, `unfitted_differences` is empty.
+#: Without a fit, more cells can differ than after a fit. The cells are reported only if at most this number
+#: of additional cells differ.
 _MAX_MORE_UNFITTED_CELLS = 2
-#: Maximum motion of a fixed tip, divided by path length.
-#: With a fixed tip, the reach is the path length.
+#: If the tip moves by at most this fraction of the path length, the path length is the reach.
 _FIXED_TIP_SPREAD = 1e-6
-#: Half a unit of each cell's last digit (m, rad).
+#: Half a unit of each cell's last digit, in metres or radians.
 HalfDigits = Sequence[Mapping[str, float]]
 
 
@@ -141,7 +137,7 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach (m).
 
-    The path length can be far larger than the reach. A table without Hayati rows may have offsets of
+    The path length can be far larger than the reach, because a table without Hayati rows may have offsets of
     kilometres.
     """
     tips = poses[:, :3, 3]
@@ -174,7 +170,7 @@ def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Mimic joints move independently."""
+    """Return `count` joint values and the tip's poses; mimic joints move independently."""
     travels = _prismatic_ranges(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = sample_uniform(ranges, count, seed)
@@ -239,17 +235,17 @@ def _make_unfitted_cells(
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the reference's row index for a cell of standard row i.
+    """Return the index of the reference row that contains a cell of standard row i, or None.
 
-    In a modified table, row i + 1 contains a, alpha and beta. None: no row contains the cell.
-    Row -1 is the first row of `_make_unfitted_cells`.
+    In a modified table, a, alpha and beta of standard row i are in the next row. For a comparison without a
+    fit, row -1 is an additional first row without a joint.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if 0 <= reference_index < len(reference.rows) else None
 
 
 def _cell_mask(reference: DHTable, model: TableArrays) -> FloatArray:
-    """Return a mask (n, 5): 1 for cells in the reference, else 0."""
+    """Return an array (n, 5) with 1 for each standard cell that the reference contains, else 0."""
     rows = range(len(reference.rows) - len(model.cells), len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
@@ -259,7 +255,7 @@ def _cell_mask(reference: DHTable, model: TableArrays) -> FloatArray:
 def _find_compensated_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row index and name of each cell that a fit compensates."""
+    """Return row index and name of each cell with an error that a fit can compensate."""
     compensated = list[tuple[int, str]]()
     if reference.convention is DHConvention.MODIFIED:
         # In the standard table, the base contains these cells.
@@ -316,7 +312,7 @@ def _find_differences_without_fit(
     unfitted: _ComparedCells,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
-    """The result is empty if no change of cells removes the tip error."""
+    """Return the differing cells, or an empty tuple if no change of cells removes the tip error."""
     corrected = fit_cells(unfitted.model, unfitted.targets, _cell_mask(reference, unfitted.model), free=False)
     metres, radians = unfitted.check_targets.largest_errors(corrected)
     if metres > NEGLIGIBLE_ERROR * unfitted.targets.scale or radians > NEGLIGIBLE_ERROR:
@@ -338,9 +334,9 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
     """Return bounds (m, rad) of the tip error.
 
-    The bounds exclude rounding errors, and ignore mimic rules. The bounds hold for all angles, and for
-    displacements within the limits. If `has_range` is false, the limits are -`ASSUMED_LIMIT` and
-    `ASSUMED_LIMIT`.
+    The bounds do not include rounding errors, and ignore mimic rules. The bounds hold for all angles, and for
+    displacements within the limits. For a prismatic joint without a range (`has_range`), the limits are
+    -`ASSUMED_LIMIT` and `ASSUMED_LIMIT`.
     """
     mechanisms = Mechanism(_make_tree_without_mimic(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -351,7 +347,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_tree_without_mimic(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Convert a path to a tree with the table's link names. Mimic rules are removed."""
+    """Convert a path to a tree without mimic rules, with the table's link names."""
     travels, z = _prismatic_ranges(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:

@@ -8,8 +8,8 @@
 Changes of different cells can often cancel the same tip error. The second fit therefore uses reweighted least
 squares, which change few cells.
 
-If two joint axes nearly coincide, changes of their offsets can cancel. A fit can then stop too early.
-`fit_free_parameters` therefore adds large angles to two consecutive offsets. Then it fits again.
+If two joint axes nearly coincide, changes of their joint offsets can cancel at the tip, and a fit can stop
+too early. `fit_free_parameters` therefore changes two consecutive offsets by a large angle, and fits again.
 """
 
 from __future__ import annotations
@@ -40,40 +40,34 @@ _CELL_MOTIONS = {
 }
 CELLS = tuple(_CELL_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _CELL_MOTIONS.values()])
-#: Maximum change of a free parameter in one step.
-#: Unit: rad, or a fraction of the reach.
+#: Maximum change of a free parameter in one step of the fit (rad, or a fraction of the reach).
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: `fit_cells` ends if a small error norm stops decreasing.
-#: Small: norm <= 6 * samples * reach * _CONVERGED_ERROR
+#: The fit of the cells ends if the norm of the errors no longer decreases, and is below a limit. For s
+#: samples, the limit is 6 s * reach * this number.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
 _MIN_WEIGHT = 1e-9
-#: Initial weight of the table's last cell.
-#: The initial weights increase evenly from 1.
-#: If two cells have equal effects, only one cell changes.
+#: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly. Two
+#: cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_CELL_WEIGHT = 1.2
-#: Initial weight of each beta, and factor at each reweighting.
-#: Low weights let the fit change alpha rather than beta.
+#: Initial weight of the column beta, and factor of this weight at each reweighting. Both numbers are below 1,
+#: so the fit changes beta only if a change of alpha does not suffice.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: Maximum RMS error of an exact fit, divided by reach.
-#: After an exact fit, no large angles are tried.
+#: Large changes of joint offsets are tried only if the RMS error exceeds this fraction of the reach.
 _EXACT_FIT_ERROR = 1e-13
-#: Maximum tip error of an exact fit, divided by reach.
-#: After an exact fit, no other joint signs are tried.
+#: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _EXACT_TIP_ERROR = 1e-12
-#: Other joint signs must reduce the error by this factor.
+#: A fit with other joint signs must reduce the smallest earlier tip error below this fraction.
 _OTHER_SIGNS_ERROR_RATIO = 0.5
-#: Maximum tip error after `_fit_translations`, divided by reach.
+#: A table with fitted translations is a start table if its tip error is at most this fraction of the reach.
 _MAX_START_ERROR = 1e-6
-#: Large changes (rad) of two joint offsets.
-#: The fit changes theta_i by +x and theta_{i+1} by -x.
-#: If cos(alpha_i) < 0, theta_{i+1} changes by +x.
-#: The two axes then have opposite directions.
+#: Large changes (rad), which the fit adds to theta_i and subtracts from theta_{i+1}. If cos(alpha_i) < 0, the
+#: fit adds the change to theta_{i+1} too, because the axes have opposite directions.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: `count` and `beam_width` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)
@@ -84,8 +78,8 @@ class TableArrays:
     """Numbers of a standard table.
 
     Attributes:
-        cells: (n, 5) numbers. The columns are theta, d, a, alpha and beta.
-        turns: Revolute joints have the value 1, prismatic joints have 0.
+        cells: (n, 5) numbers; the columns are theta, d, a, alpha and beta.
+        turns: 1 for each revolute joint, 0 for each prismatic joint.
     """
 
     cells: FloatArray
@@ -106,14 +100,14 @@ class TableArrays:
 
     @cached_property
     def T_0_first_revolute(self) -> FloatArray:
-        """Pose of the first revolute joint's frame in frame 0. All joints are at zero."""
+        """Pose of the first revolute joint's frame in frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
     @cached_property
     def T_last_revolute_tip(self) -> FloatArray:
-        """Pose of the tip in the last revolute joint's frame. The later joints are at zero."""
+        """Pose of the tip in the last revolute joint's frame, with the later joints at zero."""
         turning = np.flatnonzero(self.turns)
         begin = len(CELLS) * int(turning[-1] if turning.size else len(self.cells) - 1) + CELLS.index("a")
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
@@ -128,9 +122,9 @@ class TableArrays:
         return tuple(_CELL_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path and the amounts (s, 5 n) of its motions.
+        """Return the path and the amount (rad or m) of each elementary motion, (s, 5 n).
 
-        `values` are (s, n) joint values. The amounts are in rad or m.
+        `values` are (s, n) joint values.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variable_indices):
@@ -162,7 +156,7 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def error_twists(self, poses: FloatArray) -> FloatArray:
-        """Return the twists (6 s,) from poses to targets. Angles are multiplied by `scale`."""
+        """Return the twists (6 s,) from poses to their targets, with angles multiplied by `scale`."""
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
@@ -170,9 +164,7 @@ class TargetPoses:
 def tip_poses_and_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses and their derivatives.
-
-    The derivatives are twists. Their angles are multiplied by the scale.
+    """Return the tip's poses, and their derivatives as twists with angles multiplied by the scale.
 
     | Result | Shape |
     |---|---|
@@ -195,10 +187,7 @@ def tip_poses_and_derivatives(
 
 
 def _tip_twists_of_frame_motions(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's Jacobian (6 s, 6) for motions of a frame.
-
-    The motions are along and about the frame's axes.
-    """
+    """Return the tip's Jacobian (6 s, 6) for motions of a frame along and about the frame's axes."""
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)
     twists = np.zeros((len(poses), 6, 6))
@@ -210,15 +199,15 @@ def _tip_twists_of_frame_motions(poses: FloatArray, frames: FloatArray, scale: f
 def apply_changes(
     model: TableArrays, free: FloatArray, scale: float, cells: FloatArray | None = None
 ) -> TableArrays:
-    """Add changes to free parameters and cells. Changes of angles are multiplied by `scale`."""
+    """Add changes to free parameters and cells; the change of an angle is in rad times `scale`."""
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
     for i, offset in enumerate(free[12:]):
         k = model.variable_indices[i]
         new_cells[i, k] += offset * units[k]
-    # Base changes are twists in the first revolute joint's frame.
-    # Tool changes are twists in the last revolute joint's frame.
-    # A twist about z has exactly a joint offset's effect.
+    # A change of the base is a twist in the frame of the first revolute joint. A change of the tool is a
+    # twist in the frame of the last revolute joint. Rotations about the z axes of these two frames have
+    # exactly the same effect as joint offsets.
     base = _apply_twist(model.base @ model.T_0_first_revolute, free[:6], scale) @ np.linalg.inv(
         model.T_0_first_revolute
     )
@@ -255,8 +244,8 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         cell_derivatives = cell_derivatives * mask.ravel()
         free_derivatives = free_derivatives if free else np.zeros_like(free_derivatives)
         cells = _sparse_changes(model, start, free_derivatives, cell_derivatives, error, scale)
-        # Offset changes about nearly coinciding axes can cancel.
-        # The cutoff rcond prevents large changes that cancel.
+        # If two axes nearly coincide, large changes of the two offsets can cancel at the tip. The cutoff
+        # rcond prevents such changes.
         offsets = np.linalg.lstsq(free_derivatives, error - cell_derivatives @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
@@ -271,10 +260,9 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return cell changes that remove the tip error.
+    """Return cell changes that remove the tip error, with few differences from the cells of `start`.
 
-    The changed table differs from `start` in few cells. A cell stays unchanged if free parameters have the
-    same effect.
+    A cell stays unchanged if free parameters can have the same effect on the tip.
     """
     Q = _orthonormal_basis(free_derivatives)
     remaining = cell_derivatives - Q @ (Q.T @ cell_derivatives)
@@ -319,10 +307,7 @@ def fit_model(
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters and the joint signs.
-
-    The fit ends if the tip error is at most `target_error` (m).
-    """
+    """Fit the free parameters and the joint signs; stop if the tip error is at most `target_error` (m)."""
     written = TableArrays.of(standard)
 
     def largest_error(model: TableArrays) -> float:
@@ -333,7 +318,7 @@ def fit_model(
     if best_error <= EPS * fitted_table_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, targets, *(FAST_SEARCH if fast else ()))):
-        # Least squares can increase the largest error.
+        # A fit minimizes the sum of squared errors, so the largest error can increase.
         model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=largest_error)
         model_error = largest_error(model)
         if model_error < (1.0 if i == 0 else _OTHER_SIGNS_ERROR_RATIO) * best_error:
@@ -363,18 +348,15 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 def start_models(
     chain: FrameChain, standard: DHTable, targets: TargetPoses, *effort: int
 ) -> Iterator[TableArrays]:
-    """Yield the table, then tables with likely joint signs.
-
-    Each combination of joint signs gives one or two tables.
-    """
+    """Yield the table, then one or two tables for each likely combination of joint signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
         model = replace(TableArrays.of(standard), senses=senses, base=alignment.base, tool=alignment.tool)
         model.cells[range(len(senses)), model.variable_indices] += alignment.offsets
         yield model
-        # If axes are nearly parallel, prismatic offsets can be wrong.
-        # Fit steps are too short for errors above 100 m.
+        # If axes are nearly parallel, the offset of a prismatic joint can be wrong by hundreds of metres. The
+        # steps of a fit are too short to correct such an error.
         moved = _fit_translations(model, targets)
         metres, radians = targets.largest_errors(moved)
         if metres + targets.scale * radians <= _MAX_START_ERROR * targets.scale:
@@ -382,9 +364,9 @@ def start_models(
 
 
 def _fit_translations(model: TableArrays, targets: TargetPoses) -> TableArrays:
-    """Fit prismatic joint offsets, and translations of base and tool.
+    """Fit the offsets of prismatic joints, and the translations of base and tool.
 
-    The tip's position is linear in these parameters. One step therefore gives the exact fit.
+    The tip's position is linear in these parameters, so one step gives the exact fit.
     """
     poses, derivatives, _ = tip_poses_and_derivatives(model, targets)
     translations = np.concatenate([np.tile([True, True, True, False, False, False], 2), model.turns == 0.0])

@@ -1,11 +1,12 @@
-"""Find a convention, units or columns for which a table fits a URDF.
+"""Find another convention, other units or other columns with which a table fits a URDF.
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
-robot a different shape. A shape consists of distances, angles and offsets of consecutive axes.
+robot a different shape: distances, angles and offsets of consecutive axes. `find_better_interpretation` ranks
+the interpretations by this number, and fits at most the three best interpretations:
 
-The score of an interpretation is |table shape - URDF shape| + cost * number of differences. A difference is
-a deviation from the file's stated interpretation. `find_better_interpretation` fits at most the three
-interpretations with the smallest scores.
+    sum of |shape of the table - shape of the URDF| + cost * number of differences
+
+The differences are those from the interpretation that the file states.
 """
 
 from __future__ import annotations
@@ -32,17 +33,18 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
 _MAX_FITS = 3
-#: Axes with a smaller tilt (rad) count as parallel.
+#: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Cost of another convention, unit or pair of columns.
-#: Unit: smallest shape difference of all candidates.
+#: Cost of each difference from the interpretation that the file states, as a fraction of the smallest shape
+#: difference of all candidates. The tolerance is added to this cost.
 _DIFFERENCE_COST_RATIO = 0.1
-#: Factor in the condition of `find_better_interpretation`.
+#: A better interpretation has a tip error within the tolerance. A larger tip error suffices if it is at most
+#: this fraction of the reach, and of the tip error of the stated interpretation.
 _BETTER_FRACTION = 0.05
-#: Other keys, such as limits and mimic rules, are ignored.
+#: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: "base" and "tool" are ignored because they are fitted.
-#: "coordinates" has an effect only with mimic rules.
+#: The keys "base" and "tool" are ignored because base and tool are fitted. The key "coordinates" is ignored
+#: because it has an effect only with mimic rules.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
@@ -83,9 +85,12 @@ def find_better_interpretation(
 ) -> BetterInterpretation | None:
     """Find another interpretation that fits the URDF.
 
-    The tip error must be at most max(tolerance, 0.05 min(stated_error, reach)). `tolerance` is in metres.
-    `stated_error` is the position error (m) of the file's interpretation after a fit. `data` comes from
-    `mapping_from_text`.
+    The tip error must meet this condition:
+
+        error <= max(tolerance, 0.05 min(stated_error, reach))
+
+    `tolerance` is in metres. `stated_error` is the position error (m) of the interpretation that the file
+    states, after a fit. `data` comes from `mapping_from_text`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -95,8 +100,8 @@ def find_better_interpretation(
         return None
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
-        # If d contains the joint's variable, the joint is prismatic.
-        # Other column names can therefore change a joint's kind.
+        # A joint is prismatic if its variable is in the column d. Other column names can therefore change a
+        # joint's kind.
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
             continue
         difference = float(np.abs(path_shape(table, chain.reach) - shape_of_urdf).sum())
@@ -170,8 +175,8 @@ def path_shape(table: DHTable, scale: float) -> FloatArray:
     """Return offsets, distances and angles between consecutive axes.
 
     Joint signs, joint offsets, base and tool have no effect. Angles are multiplied by `scale`. Lengths that
-    depend on free choices are 0. Lengths next to a prismatic axis are free. Offsets along the first axis and
-    along parallel axes are free.
+    depend on free choices are replaced by 0. These are lengths next to a prismatic axis, the offset along the
+    first axis, and the offset along parallel axes.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False

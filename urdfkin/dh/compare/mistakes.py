@@ -1,8 +1,7 @@
-"""Find a single mistake in a table.
+"""Find a single mistake in a table: a wrong sign, an alpha wrong by a right angle, or a wrong order of rows.
 
-A sign or the order of rows can be wrong. An alpha can be wrong by a right angle.
-
-A fit often compensates for a wrong sign in a cell. A fit of the corrected table changes fewer parameters.
+A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. If the
+cell is corrected first, the fit changes fewer parameters.
 """
 
 from __future__ import annotations
@@ -33,13 +32,13 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _SAME_VALUE_TOLERANCE = 1e-9
-#: Maximum number of corrections with fitted joint offsets and signs.
+#: Maximum number of possible corrections for which joint offsets and joint signs are fitted.
 _MAX_FITTED_CORRECTIONS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class _TableCorrection:
-    """A corrected table. `cell` is None if the order of rows is corrected."""
+    """A corrected table; `cell` is None for a correction of the order of rows."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -61,7 +60,7 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the mistakes whose correction needs the fewest fitted parameters.
+        """Return the mistakes with a correction that needs the fewest fitted parameters.
 
         | Arguments | Allowed fit of the corrected table |
         |---|---|
@@ -94,7 +93,7 @@ class MistakeSearch:
         return ()
 
     def _agrees_after_one_fit_change(self, table: DHTable) -> bool:
-        """Return whether at most one parameter of `FitChanges` must change."""
+        """Return whether at most one change of base, tool, a joint offset or a joint sign is necessary."""
         if self._fit_one_end(table) is not None:
             return True
         model = self._fit_zeros_and_senses(table)
@@ -104,7 +103,7 @@ class MistakeSearch:
         metres, radians = self.check_targets.largest_errors(model)
         return metres <= self.tolerance and radians * self.check_targets.scale <= self.tolerance
 
-    # -- fits; None means that the fitted table does not agree ------------------------------------------
+    # -- fits; each function returns None if the fitted table does not agree with the URDF ---------------
 
     def _without_fit(self, table: DHTable) -> TableArrays | None:
         model = _make_model(table)
@@ -195,8 +194,8 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # Reversing two or three rows only exchanges the end rows.
-    # The loop above already yields exchanged rows.
+    # In a table of two or three rows, a reversal only exchanges the first and the last row. The loop above
+    # already yields this correction.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))

@@ -20,16 +20,12 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: Tip errors up to this number count as zero.
-#: Unit: rad, or metres divided by the reach.
-#: Rounding errors of a fit are far below this number.
-#: Rounding errors of data sheets are far above this number.
+#: After a correction of cells, tip errors up to this number count as zero (rad, or m per m of reach). The
+#: rounding errors of a fit are far below this number, and those of data sheets far above.
 NEGLIGIBLE_ERROR = 1e-9
-#: Smallest tip error in `fit_resolution`.
-#: Unit: rad, or metres divided by the reach.
+#: `fit_resolution` increases smaller tip errors to this number (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
-#: Factor of half a digit.
-#: Doubles represent most decimal numbers only approximately.
+#: Factor of half a digit, above 1 because doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_MARGIN = 1.0 + 1e-6
 
 
@@ -41,9 +37,9 @@ class CellDifference:
 
     Attributes:
         row: Index of the row, from 0.
-        tip_displacement: Largest motion (m) of the tip by this cell's correction, on samples.
+        tip_displacement: Largest distance (m) by which a correction of this cell moves the tip, on samples.
         half_digit: Half a unit of the last digit of `reference`.
-            An exact value and a value without text have 0.
+            0 for an exact value, and for a value without text.
     """
 
     row: int
@@ -145,12 +141,11 @@ class TableComparison:
             The bounds hold for all angles, and for displacements within the limits.
             Without limits, a prismatic joint is assumed within 10 m of zero.
         unfitted_metres, unfitted_radians: Tip errors without a fit.
-        unfitted_differences: Cells to change for agreement with the URDF without a fit.
-            Empty if `is_fitted` is false or `mistakes` is not empty.
-            Empty if a tip error remains.
+        unfitted_differences: Cells to change, so that the table agrees with the URDF without a fit.
+            Empty if `is_fitted` is false, if `mistakes` is not empty, or if a tip error remains.
             Empty if more than len(differences) + 2 cells must change.
-        not_compared: Row index and name of each cell that a fit cannot check.
-            A change of base, tool or joint offsets has the same effect.
+        not_compared: Row index and name of each cell that a fit cannot check, because a change of base, tool
+            or joint offsets has the same effect.
         residual: Tip error after cell corrections, m.
     """
 
@@ -190,7 +185,7 @@ class TableComparison:
 
     @property
     def rounding_error(self) -> float:
-        """Largest rounding error of the tip. The unit is rad, or m per m of reach and travel."""
+        """Largest tip error due to rounding (rad, or m per m of reach and travel)."""
         return EPS * fitted_table_roundings(len(self.fitted_table.rows))
 
     @property
@@ -207,7 +202,8 @@ class TableComparison:
     def is_exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        The proof has the conditions of `metres_bound`.
+        The proof has the conditions of `metres_bound`: prismatic joints stay within their limits, or within
+        10 m of zero if they have no limits.
         """
         return self.metres_bound <= self.rounding_error_metres and self.radians_bound <= self.rounding_error
 
@@ -230,14 +226,14 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether both limits are finite, and lower < upper.
 
-    If the limits are equal, poses do not show the joint's positive direction. If a URDF omits the limits,
-    lower = upper = 0.
+    If the limits are equal, poses do not show the joint's positive direction. Both limits are 0 if a URDF
+    omits them.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
 
 def fit_resolution(relative_error: float, radians: float) -> float:
-    """Return the rounding step of fitted numbers, a power of ten.
+    """Return the rounding step of fitted numbers: a power of ten, such as 1e-4.
 
     `relative_error` is in m per m of reach.
     """

@@ -1,6 +1,6 @@
-"""Find joint signs for which a reference table fits a path.
+"""Find the joint signs and directions of x with which a reference table fits a path.
 
-A table's author makes three choices without effect on the robot:
+The author of a table makes three choices that do not change the robot:
 
 | Choice | In the search |
 |---|---|
@@ -34,14 +34,13 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: Cost (m) of a joint with sign -1.
-#: The cost prefers the URDF's signs among equally good alignments.
+#: Cost (m) of a joint with sign -1. Because of this cost, the URDF's joint signs are chosen among equally
+#: good alignments.
 _REVERSAL_COST = 1e-9
-#: Weight of length differences next to a prismatic axis.
-#: A prismatic axis can move to any parallel line.
+#: Weight of length differences next to a prismatic axis. The weight is small, because a prismatic axis can
+#: move to any parallel line.
 _NEAR_PRISMATIC_WEIGHT = 1e-3
-#: Axes closer than this distance (m) count as coinciding.
-#: Between coinciding axes, x can have any direction.
+#: Axes closer than this distance (m) count as coinciding, so x can have any direction.
 _COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
@@ -68,20 +67,19 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """Signs and offsets of a path's first joints.
+    """Signs and offsets with which the first joints of a path match the first rows of a table.
 
-    These joints match the first rows of the reference table. For the last of these joints,
-    T_dh_urdf = Rz(phi_in) Tz(delta_in).
+    Rz(phi_in) Tz(delta_in) is the pose of the last joint's URDF frame in its DH frame.
     """
 
-    cost: float  # Weighted sum (m) of cell differences and `_REVERSAL_COST`.
+    cost: float  # Weighted sum (m) of the differences of cells, and a penalty for each reversed joint.
     senses: tuple[int, ...]
     offsets: tuple[float, ...]  # The last joint's offset is missing.
     phi_in: float
     delta_in: float
     base: FloatArray
-    #: Row index of a free joint offset, and a sign.
-    #: With sign -1, an increasing offset rotates x about -z.
+    #: Row index of a joint offset that can be chosen freely, and a sign. With sign -1, an increase of this
+    #: offset rotates the axis x about -z.
     free_offset: tuple[int, float] | None = None
 
 
@@ -104,9 +102,8 @@ def find_sign_fits(
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
-    # If axes nearly coincide, many directions of x fit similarly.
-    # The fit can rotate x.
-    # One alignment per combination of joint signs is therefore enough.
+    # If axes nearly coincide, many directions of x give nearly equal tables. For each combination of joint
+    # signs, one alignment is enough, because the fit can rotate x.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -114,11 +111,11 @@ def find_sign_fits(
 
 
 def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
-    """Drop alignments that differ only by a rotation about coinciding axes."""
+    """Keep one of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # Adding pi to a free joint offset reverses x.
-        # Opposite directions of x are then equivalent.
+        # If a joint offset can be chosen freely, a change of this offset by pi reverses x. Both directions of
+        # x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.delta_in, _DECIMALS)
         different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)
@@ -126,7 +123,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 
 
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return A_k. A sign -1 rotates a joint frame by pi about x."""
+    """Return A_k; the sign -1 rotates a joint frame by pi about its x axis."""
     A = chain.constants[k]
     A = _HALF_TURN_ABOUT_X @ A if sense_before < 0 else A
     return np.array(A @ _HALF_TURN_ABOUT_X if sense_after < 0 else A)
@@ -201,11 +198,12 @@ def _possible_transforms(
         steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:
         shifted = shift_along_z(A, -delta)
-        # A prismatic axis can move to any parallel line.
-        # Next to a prismatic axis, x can have any direction.
+        # The axis of a prismatic joint can be moved to any parallel line. Therefore, x can have any direction
+        # if one of the two joints is prismatic.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # With reach 0, any nonzero delta gives a Hayati row.
+        # Above `NEARLY_PARALLEL`, a Hayati row needs a common normal that is farther away than the reach. The
+        # reach 0 therefore gives a Hayati row, unless the common normal passes through both origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

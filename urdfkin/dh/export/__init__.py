@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
 _TEXT_MODULE = "urdfkin.dh.export.text"
-#: Module and description of each format. The module contains the function `write_NAME` for a format NAME.
-#: A module name "" means that `urdfkin.export` writes the format.
+#: Module and description of each format. The module contains the function `write_NAME` for a format NAME. The
+#: module name is "" if the package `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT_MODULE, "aligned text"),
     "markdown": (_TEXT_MODULE, "a Markdown table"),

@@ -1,8 +1,8 @@
-"""Export a table as symbolic code, and format names and numbers in code.
+"""Export a table as code for symbolic computation, and format names and numbers in code.
 
-Multiples of pi/12 and short decimals are exact. For example, 0.425 becomes 17/40. Other numbers are written
-as decimals. The Python code uses SymPy. The MATLAB code uses the Symbolic Math Toolbox, or Octave's package
-symbolic.
+Multiples of pi/12 and short decimals are exact: pi/2 stays pi/2, and 0.425 becomes 17/40. Other numbers are
+written as decimals. The Python code uses SymPy. The MATLAB code uses the Symbolic Math Toolbox, or Octave's
+package symbolic.
 """
 
 from __future__ import annotations

@@ -30,7 +30,8 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: Factor that removes rounding errors before rounding up.
+#: With this factor, a tiny rounding error of a bound does not increase the last digit when the bound is
+#: rounded up.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
@@ -54,7 +55,7 @@ def format_variable(
 
 
 def format_coordinate_names(table: DHTable, name: str = "q{}", escape: Callable[[str], str] = str) -> str:
-    """Return text such as "with q1 = left". Return "" if each qi is the joint of row i."""
+    """Return text such as "with q1 = left", or "" if each qi is the joint of row i."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(
@@ -63,7 +64,7 @@ def format_coordinate_names(table: DHTable, name: str = "q{}", escape: Callable[
 
 
 def format_factor_units(table: DHTable, units: Units) -> str:
-    """Return a sentence about mixed factors. A mixed factor couples a rotation and a translation."""
+    """Return a sentence on the factors' units if a revolute joint mimics a prismatic joint, or vice versa."""
     turns = {row.joint: row.kind.turns for row in table.rows}
     is_mixed = any(
         row.mimic and turns.get(row.mimic.mimicked_joint, row.kind.turns) != row.kind.turns
@@ -266,8 +267,8 @@ class PrintedPrecision:
 
     Attributes:
         metres: Largest position error on the samples.
-        bound: Proven bound within the joint limits, m. None: no finite bound is known.
-        condition: Condition of the bound, or "" without a condition.
+        bound: Proven bound within the joint limits, m; None if no finite bound is known.
+        condition: Condition of the bound, for example on the travel of a joint; "" without a condition.
     """
 
     digits: int
@@ -291,7 +292,7 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     rows = tuple(_round_row(row, units) for row in table.rows)
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
-    # `DHTable` rejects a base or tool with a rounded rotation.
+    # `DHTable` rejects a base or tool if its rotation is rounded to few digits.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)
@@ -319,7 +320,7 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
-    """Return the mimicked joint's largest absolute value, or 0 without a mimic rule."""
+    """Return the largest absolute value of the row's mimicked joint, or 0 without a mimic rule."""
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
     for other in table.rows:
@@ -332,8 +333,8 @@ def _largest_mimicked_value(table: DHTable, row: DHRow) -> float:
 def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
     """Bound the tip error (m) due to rounded table numbers.
 
-    An angle's rounding error moves the tip by at most error * lever. The lever bounds the distance from the
-    row's frame to the tip.
+    The rounding error of an angle moves the tip by at most error * lever. The lever is an upper bound of the
+    distance from the row's frame to the tip.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))

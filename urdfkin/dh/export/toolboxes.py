@@ -5,10 +5,10 @@
 | rows with four parameters | `DHRobot` |
 | Hayati rows, or no rows | `Robot` of elementary transforms (Haviland and Corke) |
 
-For MATLAB, the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms have no fifth parameter.
-These transforms ignore theta of revolute joints and d of prismatic joints. The code therefore sets each
-joint's frame by a matrix. The joint's axis is the z axis. The code is tested in Octave with substitutes for
-the toolbox's classes (`scripts/forms/octave`). The code has not been tested in MATLAB.
+For MATLAB, the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms ignore theta of a
+revolute joint and d of a prismatic joint, and have no fifth parameter. The code therefore sets each joint's
+frame by a matrix, and the joint's axis is the z axis. The code is tested in Octave with substitutes for the
+toolbox's classes (`scripts/forms/octave`), but has not been tested in MATLAB.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The textbook's equations as data: statements, meanings, functions and tests.
+"""The textbook's equations as data: the statement, meaning, functions and tests of each equation.
 
 The TOML files in `data` are the only source of `docs/equations.md` and `urdfkin explain`.
 """
@@ -19,8 +19,8 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
-#: Page 2 of the chapter (7.6 to 7.10) is lost.
-#: Section 7.2 repeats equation 7.7, so 7.7 is known.
+#: Page 2 of the chapter, with equations 7.6 to 7.10, is lost. Section 7.2 repeats equation 7.7, so the text
+#: of 7.7 is known.
 LOST_PAGE_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
