@@ -307,7 +307,7 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Map names such as "origin x" to attributes, including a joint's default values."""
+    """Map attribute names such as "origin x" to values. A joint's default values are added."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":

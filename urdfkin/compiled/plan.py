@@ -338,19 +338,21 @@ class ProgramHeader(IntEnum):
 LANES = 8
 #: Number of integers of an instruction: the operation, three operands, and the index of the first constant.
 INSTRUCTION_WIDTH = 5
-#: Number of integers that describe a joint angle in a program. Integer 0 is the scratch row of the coordinate
-#: q. Integer 1 is the scratch row of the sine. The next row contains the cosine. Integer 2 is the index of
-#: the mimic rule's constants. Integer 3 is 0 if the angle is q, and 1 if the angle is multiplier * q +
-#: offset.
+#: Number of integers that describe a joint angle in a program:
+#: 0. The scratch row of the coordinate q.
+#: 1. The scratch row of the angle's sine. The next row contains the cosine.
+#: 2. The index of the mimic rule's constants.
+#: 3. 0 if the angle is q, and 1 if the angle is multiplier * q + offset.
 ANGLE_WIDTH = 4
 #: Row 0 of scratch memory contains the number 0, and row 1 the number 1. Rows 2 to 17 contain a frame's
 #: results, and row 18 contains a joint angle. The rows from 19 contain all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers that describe a Jacobian column, if a program computes a Hessian. Integer 0 is the first
-#: scratch row of the column. Integer 1 is the joint's row in `steps`. Integer 2 is the joint's index in v.
-#: Integer 3 is the first of six scratch rows. These rows contain sums of derivatives with respect to the
-#: joint's motion.
+#: Number of integers that describe a Jacobian column, if a program computes a Hessian:
+#: 0. The first scratch row of the column.
+#: 1. The joint's row in `steps`.
+#: 2. The joint's index in v.
+#: 3. The first of six scratch rows with sums of derivatives with respect to the joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINT_OPS = {

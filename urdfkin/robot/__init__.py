@@ -1732,8 +1732,8 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # The hash of a `Reference` is slow. Therefore, a plain str with the default reference is its own key.
-        # All other keys are tuples that contain the class of `frame`, because `LinkFrame("link:a") ==
-        # "link:a"`, but their frames can differ.
+        # All other keys are tuples that contain the class of `frame`: a `LinkFrame` and a plain str can be
+        # equal, although they name different frames.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

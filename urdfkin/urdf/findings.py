@@ -178,7 +178,7 @@ class Finding:
             a name by its index, such as `joint3` or `0`. In USD, the value is the path of the prim.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
-        other_lines: Line numbers of more findings with the same code. This object also represents them.
+        other_lines: Line numbers of other findings with the same code that are combined with this finding.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 

@@ -38,8 +38,8 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
-#: Maximum number of chunks without an answer: the first number for each thread, plus the second number. Every
-#: thread then always has a next chunk.
+#: The cluster sends at most 2 chunks for each thread, plus 4 chunks, before it waits for answers. Every thread
+#: then always has a next chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent. A chunk is sent again if Dask loses the worker. A high number
 #: is safe, because a chunk can crash a child process of a Dask worker, but not the worker itself.
@@ -202,7 +202,7 @@ class Cluster:
         self._client = client
         #: Sent chunks without an answer: the task, and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: Futures of the texts that the workers store, by robot.
+        #: Maps a robot's index to the future of the robot's text, which the workers store.
         self._robot_texts: dict[int, Future[bytes]] = {}
         #: Number of sent chunks without an answer, by robot.
         self._pending_counts = Counter[int]()

@@ -359,7 +359,7 @@ class _FunctionResults:
         actual: (n, ...) results of the user's function.
         expected: (n, ...) results of urdfkin.
         scale: (n, ...) scales of the results. The allowed difference is k * eps * scale.
-        k: (n,) factors of the bounds, multiplied by `FunctionCheck.factor`.
+        k: (n,) products of `FunctionCheck.factor` and the bound of a result.
     """
 
     first: int

@@ -268,7 +268,7 @@ class Account:
     """Counts the results of one quantity.
 
     Attributes:
-        unchecked: Unchecked results of calls with checks.
+        unchecked: Number of unchecked results of calls that check only a sample of their results.
         disabled_checks: Results of calls with verify=False.
         counters: One pair (array, index) for each prepared function with verify=False. The function counts
             its results in `array[index]`.

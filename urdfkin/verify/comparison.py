@@ -64,7 +64,12 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, leading_axes: in
 
 
 def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare the largest difference of each result (`units`, in eps * scale) with the bound."""
+    """Compare the largest difference of each result with its bound.
+
+    Args:
+        units: The largest differences, in eps * scale.
+        bound: The bounds.
+    """
     if not units.size:
         return BatchComparison()
     bound_ratio = bound_ratios(units, broadcast_k(bound, units.shape))

@@ -22,8 +22,8 @@ from urdfkin.view.plot import check_summary
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
-#: Number of frames per second and maximum number of frame intervals of a saved motion, and its size (width,
-#: height) in pixels.
+#: A saved motion has this many frames per second, at most this many intervals between frames, and this width
+#: and height in pixels.
 _FRAME_RATE, _MAX_INTERVALS, _SIZE = 12.5, 250, (640, 480)
 
 

@@ -44,7 +44,8 @@ _FIT_SEED, _CHECK_SEED = 1, 2
 #: Differing cells are reported if their correction reduces the tip error to at most this fraction. A
 #: remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach also suffices.
 _MAX_CELLS_ERROR_FRACTION = 0.5
-#: The correction of a mistake must reduce the tip error to the tolerance, or to at most this fraction.
+#: A mistake is reported only if its correction reduces the tip error to the tolerance, or to this fraction of
+#: the tip error before the correction.
 _MAX_MISTAKE_ERROR_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: Without a fit, more cells can differ than after a fit. The cells are reported only if at most this number

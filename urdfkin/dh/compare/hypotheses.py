@@ -89,8 +89,8 @@ def find_better_interpretation(
 
         error <= max(tolerance, 0.05 min(stated_error, reach))
 
-    `tolerance` is in metres. `stated_error` is the position error (m) of the interpretation that the file
-    states, after a fit. `data` comes from `mapping_from_text`.
+    `tolerance` is in metres. The file states an interpretation, and `stated_error` is the position error (m)
+    after a fit with this interpretation. `data` comes from `mapping_from_text`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)

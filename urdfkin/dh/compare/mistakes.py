@@ -60,7 +60,7 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the mistakes with a correction that needs the fewest fitted parameters.
+        """Return the mistakes that explain the table with the fewest fitted parameters.
 
         | Arguments | Allowed fit of the corrected table |
         |---|---|

@@ -621,7 +621,7 @@ class Alignment:
 
     @property
     def has_free_frames(self) -> bool:
-        """Whether a convention chooses the frames of A or B, as in a Denavit-Hartenberg table."""
+        """Whether the frames of A or B follow from a convention, as in a Denavit-Hartenberg table."""
         return self.a.free_frames or self.b.free_frames
 
     @property
