@@ -27,7 +27,7 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.errors.validators import as_int, as_str, safe_repr
 from urdfkin.kinematics.inputs import as_finite, as_floats, check_range, common_batch_shape
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
+from urdfkin.kinematics.rotation import rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
 from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
@@ -545,7 +545,7 @@ class Conversion:
         for at, k in enumerate(source):
             column = self._columns[k]
             if column.cos_or_sin:
-                angle = _angle_of_pair(target_q, k, column.name) - column.zero
+                angle = _angle_of_column(target_q, k, column) - column.zero
                 shown = self._find_shown_turns(target_q, column)
                 angle = angle + math.tau * configuration.count_turns(angle, shown)
                 q[..., at] = angle / column.factor
@@ -559,7 +559,7 @@ class Conversion:
             (
                 column.factor / source.factor,
                 column.zero,
-                _angle_of_pair(target_q, k, column.name) if column.cos_or_sin else target_q[..., k],
+                _angle_of_column(target_q, k, column) if column.cos_or_sin else target_q[..., k],
                 bool(column.cos_or_sin),
             )
             for k, column in enumerate(self._columns)
@@ -938,16 +938,8 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     ]
 
 
-def _angle_of_pair(target_q: FloatArray, k: int, name: str) -> FloatArray:
-    cosine, sine = target_q[..., k], target_q[..., k + 1]
-    norm = np.hypot(cosine, sine)
-    if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
-        raise InputError(
-            "the cosine and sine of a joint must have norm 1",
-            where=name,
-            found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
-        )
-    return np.arctan2(sine, cosine)
+def _angle_of_column(target_q: FloatArray, k: int, column: _TargetNumber) -> FloatArray:
+    return configuration.angle_of_pair(target_q[..., k], target_q[..., k + 1], column.name)
 
 
 def _check_mimic_numbers(
