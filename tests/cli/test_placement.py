@@ -156,6 +156,12 @@ def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_pat
     assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in err
 
 
+def test_a_table_displays_a_rotation_beside_a_very_large_position() -> None:
+    lines = good("placement ur5 --base-placement 1e15,0,0,0,0,0.5").text.splitlines()
+    (row,) = (line.split() for line in lines if line.startswith("x "))
+    assert row == ["x", "-0.877583", "0", "-0.479426", "1e+15"]
+
+
 # -- the parts of an acceleration ---------------------------------------------------------------------
 
 POLAR = "acceleration polar --q 0.3,0.7 --v 1,2 --a 0.5,-1 --breakdown"
