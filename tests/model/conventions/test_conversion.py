@@ -643,6 +643,15 @@ def test_a_reordering_from_a_mimic_joint_uses_the_mimic_rule(tmp_path: Path) -> 
         assert np.allclose(q, other.to([0.3]), 0, 1e-13)
 
 
+def test_the_code_of_a_reordering_omits_the_last_mimic_joint() -> None:
+    arm = arm_with(rule_of_b=mimic("a", 2, 0.1))
+    start, end = arm.convention("mujoco"), arm.convention("urdfkin")
+    for symbol in "qv":
+        found = find_reordering(symbol, start, end)
+        assert found is not None
+        assert found.code("y", "x") == "y = x[..., [0]]"
+
+
 def test_no_reordering_converts_the_cosine_of_a_joint_to_the_angle_of_its_mimic_joint(tmp_path: Path) -> None:
     a = joint("a", "continuous", "l0", "l1", "", "0 0 1")
     b = joint("b", "revolute", "l1", "l2", "", "0 1 0", limit() + mimic("a"))

@@ -846,20 +846,21 @@ class Conversion:
 class Reordering:
     """The conversion of q or v from one convention to another.
 
-    A vector x is converted to `x[..., index] * factor + zero`.
+    A vector x with `size` elements is converted to `x[..., index] * factor + zero`.
     """
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
     zero: tuple[float, ...]
+    size: int
 
     def code(self, target: str, source: str) -> str:
         """Return a line of NumPy code for the conversion.
 
-        >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
+        >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0), 2).code("q_b", "q_a")
         'q_b = q_a[..., [1, 0]]'
         """
-        same = self.index == tuple(range(len(self.index)))
+        same = self.index == tuple(range(self.size))
         line = source if same else f"{source}[..., {list(self.index)}]"
         if any(factor != 1.0 for factor in self.factor):
             line += f" * np.array({list(self.factor)})"
@@ -899,7 +900,7 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
             0.0 if x.cos_or_sin else x.zero - own[k].zero * f
             for k, x, f in zip(index, other, factor, strict=True)
         ]
-        return Reordering(index, tuple(factor), tuple(zero))
+        return Reordering(index, tuple(factor), tuple(zero), start.nq)
     axes = ("linear", "angular", "point", "planar")
     if any(getattr(start.convention, axis) != getattr(end.convention, axis) for axis in axes) and (
         start._blocks or end._blocks
@@ -908,7 +909,7 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
     index = tuple(start._v_target_index[rate.index] for rate in end._rates)
     pairs = zip(end._rates, index, strict=True)
     factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
-    return Reordering(index, factors, (0.0,) * len(index))
+    return Reordering(index, factors, (0.0,) * len(index), start.nv)
 
 
 def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int | None:
