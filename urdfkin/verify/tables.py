@@ -51,7 +51,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 #: Largest ratio L / reach (see the module).
 MAX_LENGTH_RATIO = 10.0
 #: Largest rounding error (rad) of a joint's angle without a warning.
-_MAX_ANGLE_ROUNDING = 1e-9
+_MAX_ANGLE_ROUNDING = 1e-5
 
 
 class TableError(UrdfkinError):
@@ -169,7 +169,7 @@ def _describe_accuracy_loss(table: DHTable) -> str:
 
 
 def _describe_large_angle(table: DHTable, own_q: FloatArray) -> str | None:
-    """Return a sentence about a mimic joint with a very large angle, or None."""
+    """Return a sentence about a joint with a very large angle, or None."""
     largest = np.abs(table.coupling.values(own_q)).max(axis=0, initial=0.0).tolist()
     angles = [(x, row.joint) for x, row in zip(largest, table.rows, strict=True) if row.kind.turns]
     angle, joint = max(angles, default=(0.0, ""))
@@ -177,7 +177,7 @@ def _describe_large_angle(table: DHTable, own_q: FloatArray) -> str | None:
         return None
     return (
         f"{joint} turns by up to {angle:.3g} rad, which rounds by {EPS * angle:.2g} rad;"
-        " correct the multiplier or offset of its mimic rule"
+        " correct its limits or its mimic rule"
     )
 
 
