@@ -14,7 +14,7 @@ from tests.cli.running import urdfkin as command
 from tests.dh.arms import arm, with_cells
 from tests.random_chains import rotation, shift
 from tests.reading import present
-from tests.urdfs import joint, limit, mimic, robot
+from tests.urdfs import built, joint, limit, mimic, robot
 from urdfkin.dh import DHTable, Units, export, make_dh_table
 from urdfkin.dh.export.text import measure_printed_table
 from urdfkin.dh.parse_table import reference_path
@@ -70,6 +70,15 @@ def test_a_strict_table_with_a_large_rounding_error_reports_the_error_in_millime
     predicted = f"which rounds by {EPS * longest * 1e3:.2g} mm"
     assert predicted in str(check)
     assert 1e-3 * EPS * longest <= check.metres <= 100.0 * EPS * longest
+
+
+def test_a_table_with_a_very_large_mimic_multiplier_reports_the_rounding_of_the_angle() -> None:
+    motor = joint("motor", "revolute", "l0", "l1", "", "0 0 1", limit(-3, 3))
+    pose = 'xyz="1 0.5 0" rpy="0.3 0.4 0.7"'
+    gear = joint("gear", "revolute", "l1", "l2", pose, "0 0 1", limit(-3, 3) + mimic("motor", 1e16, 0.3))
+    tip = joint("end", "fixed", "l2", "l3", 'xyz="0.5 0 0"')
+    with pytest.warns(urdfkin.NotVerifiedWarning, match=r"LOSES .* gear turns by up to 3e\+16 rad"):
+        built(motor, gear, tip).dh("l3", "l0")
 
 
 def test_an_inexact_strict_table_exits_with_3_and_the_hayati_or_snapped_table_with_0() -> None:

@@ -159,6 +159,14 @@ def test_the_printed_code_converts_q_and_v_between_conventions(start: str, end: 
     assert ("six_to" in text) == ((start == "drake") != (end == "drake"))
 
 
+def test_a_conversion_that_is_no_reordering_has_no_csv(tmp_path: Path) -> None:
+    file, output = tmp_path / "r.urdf", tmp_path / "order.csv"
+    file.write_text(urdf_of(joint("a", "continuous", "l0", "l1")))
+    err = refused("order --from pinocchio --to mujoco", str(file), "-o", str(output))
+    assert "cannot express this conversion, so it has no CSV: found q; use --format table" in err
+    assert not output.exists()
+
+
 def test_the_printed_code_names_the_file_of_a_convention(tmp_path: Path) -> None:
     file = tmp_path / "own.toml"
     file.write_text('like = "mujoco"\nname = "isaaclab"\n')

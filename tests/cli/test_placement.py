@@ -132,6 +132,13 @@ def test_an_acceleration_breakdown_contains_the_part_of_the_base() -> None:
     assert [line.split()[-4] for line in done.text.splitlines() if line.startswith("base ")] == ["9.81"]
 
 
+def test_the_columns_of_a_base_acceleration_have_the_names_of_the_help(tmp_path: Path) -> None:
+    path = tmp_path / "base.csv"
+    path.write_text("alphax,ax,ay,az,alphay,alphaz\n4,1,2,3,5,6\n")
+    data = good("acceleration ur5 --format json --base-acceleration", f"@{path}").data
+    assert data["base_acceleration"] == [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]
+
+
 def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_path: Path) -> None:
     rows = np.random.default_rng(1).standard_normal((4, 7))
     rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
@@ -147,6 +154,12 @@ def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_pat
         np.testing.assert_allclose(done.data["result"], expected, atol=1e-14)
     err = refused("placement ur5 --q random:3 --base-placement", f"@{path}")
     assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in err
+
+
+def test_a_table_displays_a_rotation_beside_a_very_large_position() -> None:
+    lines = good("placement ur5 --base-placement 1e15,0,0,0,0,0.5").text.splitlines()
+    (row,) = (line.split() for line in lines if line.startswith("x "))
+    assert row == ["x", "-0.877583", "0", "-0.479426", "1e+15"]
 
 
 # -- the parts of an acceleration ---------------------------------------------------------------------

@@ -479,6 +479,16 @@ def test_an_error_in_a_csv_table_is_reported_with_position_and_reason(
     assert message in refused(tmp_path, f"# convention: standard\n{text}", ".csv")
 
 
+def test_a_row_below_a_page_break_is_refused_but_other_tables_are_skipped(tmp_path: Path) -> None:
+    table = "standard\n\ni  a  alpha  d  theta\n1  0.1  0  0  q1\n2  0.2  0  0  q2\n\n"
+    broken = f"{table}Table 2 (continued on the next page)\n3  0.3  0  0  q3\n"
+    assert "row 3: a row of the table is below the end of the table" in refused(tmp_path, broken, ".txt")
+    others = "Page 3\n\nlink  mass  x  y  z\n1  3.7  0  0  0.1\n\nJ =\n1  0  0  0  0\n2  1  0  0  0\n"
+    path = tmp_path / "whole.txt"
+    path.write_text(table + others)
+    assert len(read_table(path).rows) == 2
+
+
 @pytest.mark.parametrize("rows", [UR5, [[0.1, 0.7, 0.2, "pi/2"]], [[0, 0, 0.3, 0.5236], [0.4, "pi", 0, 0]]])
 def test_correct_rows_are_not_mistaken_for_a_different_column_order(rows: list[list[Any]]) -> None:
     assert len(table_from_rows(rows, "standard").rows) == len(rows)

@@ -1,5 +1,6 @@
 """The velocities of a line are its derivatives; a table is read exactly or rejected with the place."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -207,6 +208,26 @@ def test_a_column_heading_may_end_with_a_unit(heading: str, value: float) -> Non
     units |= {"v:elbow": "rad/s", "a:elbow": "rad/s^2"}
     (found,) = read_columns(f"{heading}\n30\n", "x.csv", "q", [], list(units), units=units).values()
     assert found.tolist() == [value]
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [
+        ("# b,a", {"b": [1.0], "a": [2.0]}),
+        ("# measured\n#b_deg, a\n", {"b": [math.radians(1.0)], "a": [2.0]}),
+        ("# a, c", {"a": [1.0], "b": [2.0]}),
+        ("# b,a\na,b", {"a": [1.0], "b": [2.0]}),
+        ("# b", {"a": [1.0], "b": [2.0]}),
+    ],
+)
+def test_a_comment_names_the_columns_only_if_it_names_exactly_the_columns(
+    head: str, columns: dict[str, list[float]]
+) -> None:
+    units = {"a": "rad", "b": "rad"}
+    found = read_columns(f"{head}\n1,2\n", "x.csv", "q", ["a", "b"], units=units)
+    assert {name: x.tolist() for name, x in found.items()} == columns
+    with pytest.raises(InputError, match=r"x\.csv:1, b_m: wrong unit"):
+        read_columns("# b_m,a\n1,2\n", "x.csv", "q", ["a", "b"], units=units)
 
 
 def test_a_joint_may_have_the_name_of_a_time_column() -> None:

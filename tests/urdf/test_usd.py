@@ -119,6 +119,28 @@ def reach(robot: urdfkin.Robot) -> float:
     return float(robot.placement([0.0, 0.0], "lower")[0, 3])
 
 
+@pytest.mark.parametrize(
+    ("scale", "unit", "message"),
+    [
+        ("1e200", 1.0, "/arm/base: the scale of a prim is too small or too large: found 1e.200"),
+        ("1e-200", 1.0, "/arm/base: the scale of a prim is too small or too large: found 1e-200"),
+        ("1e-6", 1.0, "/arm/base: OpenUSD's physics does not read a scale below 1e-05: found 1e-06"),
+        ("1", 1e200, "metersPerUnit must be a positive number from 1e-30 to 1e.30: found 1e.200"),
+    ],
+)
+def test_a_scale_beyond_the_range_of_openusd_is_refused_with_the_prim(
+    scale: str, unit: float, message: str, write: Write
+) -> None:
+    text = stage(moved(("double3", "scale", f"({scale}, {scale}, {scale})")) + ARM, unit=unit)
+    with pytest.raises(InputError, match=message):
+        loaded(write(text))
+
+
+def test_the_position_of_a_prim_beyond_the_range_of_doubles_is_refused(read: Read) -> None:
+    with pytest.raises(InputError, match=r"/arm/lower: the position of a prim is too large: found 1e.300"):
+        read(BASE + body("upper", "(0, 0, 1)") + body("lower", "(1e300, 0, 1)") + JOINTS)
+
+
 def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_the_other(read: Read) -> None:
     rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, "inf"), localPos0=(2, 0, 0))
     robot = read(LINKS + SHOULDER + rail)

@@ -573,7 +573,8 @@ def _read_stdin() -> str:
 _POSITION_NAMES = ("x", "y", "z")
 _RPY_POSE_NAMES = (*_POSITION_NAMES, "roll", "pitch", "yaw")
 _QUATERNION_POSE_NAMES = (*_POSITION_NAMES, "qx", "qy", "qz", "qw")
-_SIX_VECTOR_NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
+_VELOCITY_NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
+_ACCELERATION_NAMES = ("ax", "ay", "az", "alphax", "alphay", "alphaz")
 
 _BASE_MOTION_OPTIONS = {
     "q": click.option(
@@ -615,8 +616,8 @@ def with_base_motion(
         "0,0,0,0,0,0" if text is None else text for text in (placement, velocity, acceleration)
     )
     T = _placements(*_read_rows(placement, "--base-placement", (_RPY_POSE_NAMES, _QUATERNION_POSE_NAMES)))
-    v, _ = _read_rows(velocity, "--base-velocity", (_SIX_VECTOR_NAMES,))
-    a, _ = _read_rows(acceleration, "--base-acceleration", (_SIX_VECTOR_NAMES,))
+    v, _ = _read_rows(velocity, "--base-velocity", (_VELOCITY_NAMES,))
+    a, _ = _read_rows(acceleration, "--base-acceleration", (_ACCELERATION_NAMES,))
     problem = "the batches of q, v, a and the base motion have different lengths"
     q, v_, a_, *base = _repeat_single(problem, [x.q, x.v, x.a, T, v, a])
     names = "base_placement", "base_velocity", "base_acceleration"

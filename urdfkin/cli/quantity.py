@@ -49,7 +49,7 @@ from urdfkin.cli.output import (
     format_check_line,
     report_compilation,
 )
-from urdfkin.errors.display import NOISE_FRACTION, Table, TextDocument, format_number
+from urdfkin.errors.display import Table, TextDocument, format_number, noise_limit
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
@@ -291,7 +291,7 @@ def _jacobian_column_table(quantity: Quantity, rates: Sequence[str], value: Floa
 
     if quantity.ndim == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
-    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE_FRACTION * np.abs(value).max(initial=0.0)
+    seen = np.abs(value).max(axis=0, initial=0.0) > noise_limit(float(np.abs(value).max(initial=0.0)))
     pairs = zip(*np.nonzero(seen), strict=True)
     rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in pairs]
     return Table(("column", "changed by", *quantity.labels), rows, left=2, names=(0, 1))
@@ -306,7 +306,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
     heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
 
     def table(k: int) -> Iterator[Table]:
-        noise = NOISE_FRACTION * float(abs(found.terms[k]).max(initial=0.0))
+        noise = noise_limit(float(abs(found.terms[k]).max(initial=0.0)))
         rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
         # With four digits, a row fits on a terminal.
         cells = [(*names, *(format_number(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]

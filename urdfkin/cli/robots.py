@@ -247,6 +247,10 @@ def _conversion_code(robot: Robot, a: str, b: str) -> Answer:
         return document
 
     def csv_rows() -> Iterator[list[object]]:
+        if missing := [letter for letter, one in found.items() if one is None]:
+            message = "indices, factors and zeros cannot express this conversion, so it has no CSV"
+            remedy = "use --format table, which prints code"
+            raise InputError(message, where=f"{a} to {b}", found=", ".join(missing), remedy=remedy)
         yield ["what", "name", "index", "factor", "zero"]
         for letter, one in found.items():
             if one is not None:

@@ -70,6 +70,8 @@ _TITLE = re.compile(
     r"^(?:.*\bparameters of )?(?:\*\*)?(?P<robot>.+?)(?:\*\*)?[:,] (?P<base>.+?) to (?P<tip>.+?),"
     r" (?P<convention>standard|modified) "
 )
+#: Line above a matrix, such as `base (metres):` or `T =`. The matrix can look like rows of a table.
+_MATRIX_CAPTION = re.compile(r"\b(?:base|tool)\b|[:=]\W*$", re.IGNORECASE)
 _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 _NUMBER_COLUMNS = (*COLUMNS, "beta", "offset")
 _COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
@@ -168,17 +170,29 @@ def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: s
             end = len(lines)
         if any(_parse_columns(split(other)) for other in lines[end:]):
             raise _second_table_error(line)
-        below = next((other for other in lines[end + 1 :] if other.strip() and not other.startswith("#")), "")
-        if _is_row(split(below), columns):
-            raise InputError(
-                "a row of the table is below the end of the table",
-                where=f"row {len(rows) + 1}",
-                found=safe_repr(below.strip()),
-                remedy="remove the empty line, the comment or the line break in a name above this row",
-            )
+        _refuse_rows_below(lines[end + 1 :], split, columns, len(rows))
         others, decimal_commas = [*lines[:k], *lines[end:]], separator in (";", "\t", "|")
         return _Grid(columns, rows, others, decimal_commas, separator == ",")
     return None
+
+
+def _refuse_rows_below(
+    lines: list[str], split: Callable[[str], list[str]], columns: tuple[_Column, ...], count: int
+) -> None:
+    is_other_table = False
+    for line in lines:
+        cells = split(line)
+        if not line.strip() or line.startswith("#"):
+            continue
+        if not _is_row(cells, columns):
+            is_other_table = len(cells) == len(columns) or bool(_MATRIX_CAPTION.search(line))
+        elif not is_other_table:
+            raise InputError(
+                "a row of the table is below the end of the table",
+                where=f"row {count + 1}",
+                found=safe_repr(line.strip()),
+                remedy="remove the empty line, the text or the line break in a name above this row",
+            )
 
 
 def _is_row(cells: list[str], columns: tuple[_Column, ...]) -> bool:

@@ -22,7 +22,9 @@ from urdfkin.errors.escape import (
 TREE_LINES = "├│└ "
 ASCII_TREE_LINES = str.maketrans("├│└", "+|`")
 #: A number is displayed as 0 if it is at most this fraction of the table's largest number.
-NOISE_FRACTION = 1e-15
+_NOISE_FRACTION = 1e-15
+#: The units of a table's numbers can differ. Therefore, the largest number counts at most this much.
+_MAX_LARGEST = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +47,8 @@ class Table:
 
     def cells(self) -> list[list[str]]:
         largest = max((abs(x) for row in self.rows for x in row if not isinstance(x, str)), default=0.0)
-        return [
-            [x if isinstance(x, str) else format_number(x, NOISE_FRACTION * largest) for x in row]
-            for row in self.rows
-        ]
+        noise = noise_limit(largest)
+        return [[x if isinstance(x, str) else format_number(x, noise) for x in row] for row in self.rows]
 
     def _split_tree_lines(self) -> list[list[tuple[str, str]]]:
         """Split each heading and cell into its leading characters such as `├ ` and the following text."""
@@ -235,7 +235,16 @@ def format_count(n: int, noun: str) -> str:
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
-def format_number(value: float, noise: float = NOISE_FRACTION, digits: int = 6) -> str:
+def noise_limit(largest: float) -> float:
+    """Return the limit up to which a table displays a number as 0. `largest` is the table's largest number.
+
+    >>> round(noise_limit(2.0), 18), round(noise_limit(1e300), 9)
+    (2e-15, 1e-06)
+    """
+    return _NOISE_FRACTION * min(largest, _MAX_LARGEST)
+
+
+def format_number(value: float, noise: float = _NOISE_FRACTION, digits: int = 6) -> str:
     """Format a number with `digits` significant digits. Absolute values up to `noise` become "0".
 
     >>> format_number(0.1 + 0.2), format_number(1e-16), format_number(1e-16, noise=0.0)

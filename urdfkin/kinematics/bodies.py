@@ -45,7 +45,8 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors.validators import as_bool, as_str
+from urdfkin.errors import InputError
+from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.kinematics.inputs import (
     FloatArray,
     as_finite,
@@ -101,6 +102,9 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     | angular velocity | 7.49: w_01 + w_12 |
     | angular acceleration | derivative of 7.49, with the term w_01 x w_12 |
     """
+    for frame in (outer, inner):
+        if not isinstance(frame, MovingFrame):
+            raise InputError("a moving frame must be a MovingFrame", found=safe_repr(frame))
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
     w_12, alpha_12 = eq.rotate(R, inner.w_0_1), eq.rotate(R, inner.alpha_0_1)
@@ -119,6 +123,8 @@ def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
 
     Entry i is the motion of frame i + 1 relative to frame i.
     """
+    if not isinstance(frames, Iterable):
+        raise InputError("compose_all needs a list of MovingFrames", found=safe_repr(frames))
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
 

@@ -559,7 +559,10 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
         if not _is_in_pinocchio(joint, mimic=mimic):
             continue
         size = joint.kind.nq_pinocchio
-        values = _angle_of_pair(joint, q[..., at : at + size])
+        values = q[..., at : at + size]
+        if size > joint.kind.nq:
+            angle = angle_of_pair(values[..., -2], values[..., -1], f"joint {joint.name}")
+            values = np.concatenate((values[..., :-2], angle[..., None]), axis=-1)
         at += size
         if joint.mimic:
             mimic_joints.append((joint, tree.q_index[i], values))
@@ -578,23 +581,23 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
     return own
 
 
-def _angle_of_pair(joint: Joint, values: FloatArray) -> FloatArray:
-    if joint.kind.nq_pinocchio == joint.kind.nq:
-        return values
-    cosine, sine = values[..., -2], values[..., -1]
+def angle_of_pair(cosine: FloatArray, sine: FloatArray, where: str) -> FloatArray:
     norm = np.hypot(cosine, sine)
     if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
         raise InputError(
             "(cos, sin) must have norm 1",
-            where=f"joint {joint.name}",
+            where=where,
             found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
             question=QuestionsSection.CONTINUOUS_JOINTS,
         )
-    return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
+    return np.arctan2(sine, cosine)
 
 
-#: Largest number of turns that `count_turns` finds from cosines and sines.
+#: Largest number of turns of either joint that `count_turns` finds from cosines and sines.
 _MAX_TURNS = 16
+#: Smallest |multiplier| for which `count_turns` counts the mimic joint's turns.
+#: A much smaller multiplier fits any value within `_MIMIC_TOLERANCE`.
+_MIN_MULTIPLIER = 1e-4
 
 
 def count_turns(angle: FloatArray, shown: Sequence[tuple[float, float, FloatArray, bool]]) -> FloatArray:
@@ -611,9 +614,18 @@ def count_turns(angle: FloatArray, shown: Sequence[tuple[float, float, FloatArra
     for multiplier, offset, value, is_pair in shown:
         if multiplier and not is_pair:
             return np.rint((value - offset - multiplier * angle) / (multiplier * math.tau))
+    few = np.arange(-_MAX_TURNS, _MAX_TURNS + 1, dtype=np.float64)
+    candidates = [np.broadcast_to(few, (*angle.shape, few.size))]
+    # A gear of 1/50 turns once while its motor turns 50 times.
+    candidates += [
+        np.rint(((value - offset - multiplier * angle)[..., None] + math.tau * few) / (multiplier * math.tau))
+        for multiplier, offset, value, _ in shown
+        if _MIN_MULTIPLIER <= abs(multiplier) < 1.0
+    ]
+    turns = np.concatenate(candidates, axis=-1)
     # The first value that fits is nearest to 0: 0, 1, -1, 2, ... turns for a negative angle.
-    turns = np.array(sorted(range(_MAX_TURNS, -_MAX_TURNS - 1, -1), key=abs), np.float64)
-    turns = np.where(angle[..., None] > 0.0, -turns, turns)
+    away = (turns > 0.0) == (angle[..., None] > 0.0)
+    turns = np.take_along_axis(turns, np.argsort(np.abs(turns) + 0.5 * away, axis=-1), axis=-1)
     fits = np.ones(turns.shape, bool)
     for multiplier, offset, value, _ in shown:
         rest = (value - offset - multiplier * angle)[..., None] - multiplier * math.tau * turns

@@ -468,8 +468,9 @@ def read_columns(
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
     Empty lines and lines that begin with # are skipped. The first other line may name the columns, in any
-    order. Otherwise, the columns are `required`. `units` contains the SI unit of each column that may have a
-    unit in its heading.
+    order. A comment above the first number may also name the columns, as in a file of `numpy.savetxt`.
+    Otherwise, the columns are `required`. `units` contains the SI unit of each column that may have a unit in
+    its heading.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -477,6 +478,10 @@ def read_columns(
     rows = _rows(text, where)
     names, written = list(required), list[str]()
     first = next(rows, None)
+    if first is not None and not _is_header(first[1], names):
+        header = _find_commented_header(text, where, required, optional, units or {})
+        if header is not None:
+            first, rows = header, chain([first], rows)
     if first is not None and (requires_header or _is_header(first[1], names)):
         line, cells = first
         headings = [_parse_heading(cell, f"{where}:{line}", units or {}) for cell in cells]
@@ -503,6 +508,25 @@ def read_columns(
     return found | {
         name: _convert_to_si(found[name], unit) for name, unit in zip(names, written, strict=False) if unit
     }
+
+
+def _find_commented_header(
+    text: str, where: str, required: Sequence[str], optional: Sequence[str], units: Mapping[str, str]
+) -> tuple[int, list[str]] | None:
+    """Return the line and cells of a comment above the first number that names exactly the columns."""
+    for line, words in enumerate(text.splitlines(), 1):
+        if words.strip() and not words.lstrip().startswith("#"):
+            break
+        try:
+            cells = [cell.strip() for cell in next(csv.reader([words.lstrip().lstrip("#").lstrip()]), [])]
+        except csv.Error:
+            continue
+        if len(cells) < max(1, len(required)):
+            continue
+        names = [_parse_heading(cell, f"{where}:{line}", units)[0] for cell in cells]
+        if {*required} <= {*names} <= {*required, *optional} and len(names) == len({*names}):
+            return line, cells
+    return None
 
 
 _TIMES = ("t", "time", "timestamp")

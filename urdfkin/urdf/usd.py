@@ -69,6 +69,13 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: error below 14 u (4 * 2 sqrt(3) u). Rounding changes the length of a stored quaternion by at most u.
 #: Therefore, the cosine between two axes changes by at most 4 u.
 _MAX_SHEAR = 14.0
+#: Largest metersPerUnit and scale. The smallest is the inverse of this number. Products and squares of these
+#: numbers are then finite.
+_MAX_SCALE = 1e30
+#: OpenUSD's class `GfTransform` replaces a smaller scale by 1e-10.
+_MIN_JOINT_SCALE = 1e-5
+#: Largest distance (m) of a prim from the origin, along an axis.
+_MAX_POSITION = 1e60
 #: Rule USD303 checks only limits above this angle (degrees), because a revolute joint with smaller limits
 #: hardly moves.
 _NEGLIGIBLE_LIMIT_DEGREES = 0.01
@@ -408,8 +415,8 @@ class _StageReader:
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
         pxr, stage = self.pxr, self.stage
         self._meters_per_unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
-        if not (math.isfinite(self._meters_per_unit) and self._meters_per_unit > 0.0):
-            what = "metersPerUnit must be a positive number"
+        if not 1.0 / _MAX_SCALE <= self._meters_per_unit <= _MAX_SCALE:
+            what = f"metersPerUnit must be a positive number from {1.0 / _MAX_SCALE:g} to {_MAX_SCALE:g}"
             raise InputError(what, where=self.source, found=f"{self._meters_per_unit:g}")
         if (up_axis := str(pxr.UsdGeom.GetStageUpAxis(stage))) not in ("Y", "Z"):
             raise InputError("upAxis must be Y or Z", where=self.source, found=up_axis)
@@ -535,9 +542,15 @@ class _StageReader:
         M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
         if not np.isfinite(M).all():
             raise InputError("the transform of a prim is not finite", where=where)
-        scale = np.linalg.norm(M[:3, :3], axis=0)
+        scale = np.hypot.reduce(M[:3, :3], axis=0)
         if not (scale > 0.0).all():
             raise InputError("the scale of a prim is zero", where=where)
+        if scale.min() < 1.0 / _MAX_SCALE or scale.max() > _MAX_SCALE:
+            found = ", ".join(f"{x:g}" for x in scale)
+            raise InputError("the scale of a prim is too small or too large", where=where, found=found)
+        if (distance := np.abs(M[:3, 3]).max()) > _MAX_POSITION / self._meters_per_unit:
+            message = "the position of a prim is too large"
+            raise InputError(message, where=where, found=f"{distance:g} units")
         if np.linalg.det(M[:3, :3]) < 0.0:
             scale = -scale
         R = M[:3, :3] / scale
@@ -681,6 +694,10 @@ class _StageReader:
         if not other or not other.IsDefined() or self._is_in_point_instancer(target):
             return None
         T, scale = self._world_pose(other)
+        if p.any() and (smallest := np.abs(scale).min()) < _MIN_JOINT_SCALE:
+            message = f"OpenUSD's physics does not read a scale below {_MIN_JOINT_SCALE:g}"
+            where, remedy = f"{self.source}: {target}", "apply the scale to the shapes and positions"
+            raise InputError(message, where=where, found=f"{smallest:g}", remedy=remedy)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
         error_bounds = error_bounds[0] * float(np.abs(scale).max()), error_bounds[1]
         while other and str(other.GetPath()) not in self._bodies:

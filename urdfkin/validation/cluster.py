@@ -38,8 +38,8 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import package_version
 
-#: The cluster sends at most 2 chunks for each thread, plus 4 chunks, before it waits for answers. Every thread
-#: then always has a next chunk.
+#: At most 2 chunks for each thread, plus 4 chunks, wait for an answer. Every thread then always has a next
+#: chunk.
 _CHUNKS_PER_THREAD, _EXTRA_CHUNKS = 2, 4
 #: Maximum number of times that a chunk is sent. A chunk is sent again if Dask loses the worker. A high number
 #: is safe, because a chunk can crash a child process of a Dask worker, but not the worker itself.

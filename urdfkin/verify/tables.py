@@ -51,6 +51,8 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 
 #: Largest ratio of the length L to the reach (see the module).
 MAX_LENGTH_RATIO = 10.0
+#: Largest rounding error (rad) of a joint's angle without a warning.
+_MAX_ANGLE_ROUNDING = 1e-5
 
 
 class TableError(UrdfkinError):
@@ -142,6 +144,8 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
             differences, error_scales.with_min_reach(table_length), snap_effect
         )
         loss = _describe_accuracy_loss(table) if max(relaxed_ratios.values()) <= 1.0 else None
+    elif max(bound_ratios.values()) <= 1.0:
+        loss = _describe_large_angle(table, own_q)
     metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
     has_snapping = bool(table.snap and table.snap.changes)
     return TableCheck(len(own_q), metres, radians, units, bound_ratios, has_snapping, loss)
@@ -162,6 +166,19 @@ def _describe_accuracy_loss(table: DHTable) -> str:
     return (
         f"{cell} of {joint} is {length:.3g} m, which rounds by {EPS * length * 1e3:.2g} mm;"
         f" {snap}use Hayati rows"
+    )
+
+
+def _describe_large_angle(table: DHTable, own_q: FloatArray) -> str | None:
+    """Return a sentence about a joint with a very large angle, or None."""
+    largest = np.abs(table.coupling.values(own_q)).max(axis=0, initial=0.0).tolist()
+    angles = [(x, row.joint) for x, row in zip(largest, table.rows, strict=True) if row.kind.turns]
+    angle, joint = max(angles, default=(0.0, ""))
+    if EPS * angle <= _MAX_ANGLE_ROUNDING:
+        return None
+    return (
+        f"{joint} turns by up to {angle:.3g} rad, which rounds by {EPS * angle:.2g} rad;"
+        " correct its limits or its mimic rule"
     )
 
 

@@ -340,7 +340,7 @@ def _remove_message_handlers(server: Any) -> None:
 
 
 def _test_filter(requests: RequestFilter, port: int) -> None:
-    """Raise UnguardedError if the running server refuses its own page, or accepts a request of another page."""
+    """Raise UnguardedError if the server refuses its own page, or accepts a request of another page."""
     host = requests.address(port).split("/")[2]
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
     websocket = here | {

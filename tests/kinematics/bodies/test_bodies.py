@@ -12,6 +12,7 @@ from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNa
 from urdfkin.kinematics.bodies import (
     MovingFrame,
     analytical_jacobian,
+    compose,
     compose_all,
     frame_velocity,
     orientation_of,
@@ -159,3 +160,12 @@ def test_velocities_are_converted_to_the_tool_and_back() -> None:
     there = tool_velocity(velocity, d)
     assert np.array_equal(there[:, 3:], velocity[:, 3:])
     assert np.abs(frame_velocity(there, d) - velocity).max() <= 4 * ROUNDING
+
+
+def test_the_composition_of_other_values_than_moving_frames_is_refused() -> None:
+    one = MovingFrame(np.eye(3), np.zeros(3))
+    for first, second in ((one, None), (np.eye(4), one)):
+        with pytest.raises(InputError, match="a moving frame must be a MovingFrame: found"):
+            compose(first, second)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="compose_all needs a list of MovingFrames"):
+        compose_all(one)  # type: ignore[arg-type]

@@ -459,6 +459,18 @@ def test_cosines_and_sines_keep_the_turns_that_move_a_mimic_joint(kind: str, mul
     assert np.allclose(robot.placement(back, "l2"), robot.placement(q, "l2"), 0, 1e-13)
 
 
+@pytest.mark.parametrize("multiplier", [1 / 50, -3 / 50, 0.01, 0.501])
+def test_a_pinocchio_configuration_shows_the_turns_of_a_geared_motor(multiplier: float) -> None:
+    motor = joint("motor", "continuous", "l0", "l1", "", "0 0 1")
+    gear = joint("gear", "continuous", "l1", "l2", 'xyz="1 0 0"', "0 1 0", mimic("motor", multiplier, 0.1))
+    robot = built(motor, gear, verify=False)
+    pinocchio = robot.convention("pinocchio")
+    for turns in range(-24, 25):
+        q = np.array([0.3 + math.tau * turns])
+        for back in (robot.from_pinocchio(robot.to_pinocchio(q)), pinocchio.from_(pinocchio.to(q))):
+            assert np.allclose(back, q, 0, 1e-12)
+
+
 NAMES = ("1", "12a", "a-b", "joint.1", "a b", "é", "-", "_x", "", "a/b-c", "ok_2", "漢😀-é.", "root_joint.x")
 #: What OpenUSD Exchange 3.0.1 and OpenUSD 26.8 return for these names; the libraries are asked below.
 IN_USD = (
@@ -629,6 +641,15 @@ def test_a_reordering_from_a_mimic_joint_uses_the_mimic_rule(tmp_path: Path) -> 
         assert found is not None
         q = one.to([0.3])[list(found.index)] * found.factor + found.zero
         assert np.allclose(q, other.to([0.3]), 0, 1e-13)
+
+
+def test_the_code_of_a_reordering_omits_the_last_mimic_joint() -> None:
+    arm = arm_with(rule_of_b=mimic("a", 2, 0.1))
+    start, end = arm.convention("mujoco"), arm.convention("urdfkin")
+    for symbol in "qv":
+        found = find_reordering(symbol, start, end)
+        assert found is not None
+        assert found.code("y", "x") == "y = x[..., [0]]"
 
 
 def test_no_reordering_converts_the_cosine_of_a_joint_to_the_angle_of_its_mimic_joint(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.errors.validators import as_int, as_str, safe_repr
 from urdfkin.kinematics.inputs import as_finite, as_floats, check_range, common_batch_shape
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
+from urdfkin.kinematics.rotation import rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, as_text_or_mapping
 from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
@@ -544,7 +544,7 @@ class Conversion:
         for at, k in enumerate(source):
             column = self._columns[k]
             if column.cos_or_sin:
-                angle = _angle_of_pair(target_q, k, column.name) - column.zero
+                angle = _angle_of_column(target_q, k, column) - column.zero
                 shown = self._find_shown_turns(target_q, column)
                 angle = angle + math.tau * configuration.count_turns(angle, shown)
                 q[..., at] = angle / column.factor
@@ -558,7 +558,7 @@ class Conversion:
             (
                 column.factor / source.factor,
                 column.zero,
-                _angle_of_pair(target_q, k, column.name) if column.cos_or_sin else target_q[..., k],
+                _angle_of_column(target_q, k, column) if column.cos_or_sin else target_q[..., k],
                 bool(column.cos_or_sin),
             )
             for k, column in enumerate(self._columns)
@@ -845,20 +845,21 @@ class Conversion:
 class Reordering:
     """The conversion of q or v from one convention to another.
 
-    A vector x is converted to `x[..., index] * factor + zero`.
+    A vector x with `size` elements is converted to `x[..., index] * factor + zero`.
     """
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
     zero: tuple[float, ...]
+    size: int
 
     def code(self, target: str, source: str) -> str:
         """Return a line of NumPy code for the conversion.
 
-        >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
+        >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0), 2).code("q_b", "q_a")
         'q_b = q_a[..., [1, 0]]'
         """
-        same = self.index == tuple(range(len(self.index)))
+        same = self.index == tuple(range(self.size))
         line = source if same else f"{source}[..., {list(self.index)}]"
         if any(factor != 1.0 for factor in self.factor):
             line += f" * np.array({list(self.factor)})"
@@ -898,7 +899,7 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
             0.0 if x.cos_or_sin else x.zero - own[k].zero * f
             for k, x, f in zip(index, other, factor, strict=True)
         ]
-        return Reordering(index, tuple(factor), tuple(zero))
+        return Reordering(index, tuple(factor), tuple(zero), start.nq)
     axes = ("linear", "angular", "point", "planar")
     if any(getattr(start.convention, axis) != getattr(end.convention, axis) for axis in axes) and (
         start._blocks or end._blocks
@@ -907,7 +908,7 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
     index = tuple(start._v_target_index[rate.index] for rate in end._rates)
     pairs = zip(end._rates, index, strict=True)
     factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
-    return Reordering(index, factors, (0.0,) * len(index))
+    return Reordering(index, factors, (0.0,) * len(index), start.nv)
 
 
 def _find_source(numbers: Sequence[_TargetNumber], target: _TargetNumber) -> int | None:
@@ -937,16 +938,8 @@ def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     ]
 
 
-def _angle_of_pair(target_q: FloatArray, k: int, name: str) -> FloatArray:
-    cosine, sine = target_q[..., k], target_q[..., k + 1]
-    norm = np.hypot(cosine, sine)
-    if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
-        raise InputError(
-            "the cosine and sine of a joint must have norm 1",
-            where=name,
-            found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
-        )
-    return np.arctan2(sine, cosine)
+def _angle_of_column(target_q: FloatArray, k: int, column: _TargetNumber) -> FloatArray:
+    return configuration.angle_of_pair(target_q[..., k], target_q[..., k + 1], column.name)
 
 
 def _check_mimic_numbers(
