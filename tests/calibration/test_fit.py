@@ -96,6 +96,13 @@ def test_joint_offsets_alone_are_identified() -> None:
     np.testing.assert_allclose(found.changes, true.truth, atol=1e-14)
 
 
+def test_the_fits_of_a_calibration_share_no_array_of_values() -> None:
+    true = bench(BRANCHED, ("base",), "hand", "trunk")
+    found = true.calibrate(fit=["base"])
+    before, fitted = present(found.base_tool_fit), present(found.full_fit)
+    assert not np.shares_memory(before.parameter_values, fitted.parameter_values)
+
+
 def test_gains_are_identified_and_not_written() -> None:
     true = bench("ur5", ("gains",), "tool0", "base", error=1e-3)
     found = true.calibrate(fit=["gains"])

@@ -9,6 +9,7 @@ import pytest
 
 from tests.attacks.hostile import urdf
 from tests.cli.running import good, refused, urdfkin
+from tests.urdfs import joint, robot
 
 
 @pytest.mark.slow
@@ -154,3 +155,15 @@ def test_octave_receives_the_name_of_the_function_and_not_of_the_file(
     assert urdfkin("export --check", str(path)).code == 0
     assert (tmp_path / "said").read_text().splitlines()[-1] == "planar_two_link_tip_kinematics().check();"
     assert (tmp_path / "there").read_text() == "planar_two_link_tip_kinematics.m\n"
+
+
+@pytest.mark.parametrize("form", ["dh", "screws"])
+def test_a_form_that_cannot_contain_a_joint_advises_no_option_of_other_commands(
+    form: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "moving.urdf"
+    joints = joint("free", "floating", "world", "body"), joint("elbow", "continuous", "body", "hand")
+    path.write_text(robot(*joints), "utf-8")
+    message = refused("export", str(path), "--form", form)
+    assert f"joint free: the form {form} cannot contain a floating joint" in message
+    assert message.rstrip().endswith("use the form tree, or another frame")

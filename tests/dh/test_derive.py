@@ -348,6 +348,7 @@ def test_a_multiple_of_fifteen_degrees_is_written_as_a_fraction_of_pi_and_read_e
 
 def test_a_rounded_right_angle_is_not_written_as_a_fraction_of_pi() -> None:
     assert pi_fraction(1.5707963) is None
+    assert pi_fraction(1e308) is None
     assert Units().format_angle(1.5708) == "1.5708"
     assert Units(AngleUnit.DEGREES, digits=9).format_angle(1.5708) == "90.0002105"
 

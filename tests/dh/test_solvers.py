@@ -79,6 +79,14 @@ def test_the_point_from_which_the_reach_is_measured_is_stated(
     assert found.sampled_reach <= found.reach
 
 
+@pytest.mark.parametrize("metres", [1e200, 1e-200])
+def test_the_reach_is_correct_if_its_square_is_not_a_double(metres: float) -> None:
+    found = of_tree(arm(shift(0, 0, 0), shift(metres, 0, 0), kinds="RR", tip=shift(metres, 0, 0)))
+    assert found.sampled_reach == pytest.approx(2.0 * metres, rel=1e-3)
+    assert found.reach == pytest.approx(2.0 * metres)
+    assert found.pairs[0].distance == pytest.approx(metres)
+
+
 def test_the_command_states_the_point_from_which_the_reach_is_measured() -> None:
     text, data = (good(f"structure planar_two_link --format {form}") for form in ("table", "json"))
     assert f"measured from (0, 0, 0) m, {FIRST_AXIS} base's origin" in text.text

@@ -189,6 +189,16 @@ def test_a_wrong_origin_alone_or_a_wrong_direction_alone_is_a_disagreement(
     assert said in str(error.value)
 
 
+def test_a_chain_with_an_infinite_bound_is_refused() -> None:
+    text = urdfs.robot(
+        urdfs.joint("one", "prismatic", "base", "middle", more=urdfs.limit(-1.7e308, 1.7e308)),
+        urdfs.joint("two", "prismatic", "middle", "tip", more=urdfs.limit(-1.7e308, 1.7e308)),
+    )
+    robot = urdfkin.load(text)
+    with pytest.raises(RangeError, match="the bound on a position exceeds the range"):
+        check_chain(robot.verifier, robot.chain("tip"), np.array([[1.7e308, -1.7e308]]))
+
+
 # -- frames and columns of a path ------------------------------------------------------------------
 
 

@@ -304,6 +304,19 @@ def test_a_missing_or_wrong_file_is_reported(message: str, desk: Browser, fleet:
     desk.errors()
 
 
+def test_details_load_if_the_name_of_the_page_has_a_special_meaning_in_a_url(
+    desk: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(html, "MAX_PAGE_CHARACTERS", 0)
+    for place, text in html.as_files(arms(), "run #5, 50%?.html"):
+        (tmp_path / place).parent.mkdir(exist_ok=True)
+        (tmp_path / place).write_text(text, encoding="utf-8")
+    desk.open(tmp_path / "run #5, 50%?.html")
+    desk.js("document.querySelector('#robot-1').open = true")
+    desk.wait("return !!document.querySelector('#robot-1 :is(table.checks, .reason)')")
+    assert desk.js("return !!document.querySelector('#robot-1 table.checks')")
+
+
 # -- a robot in a notebook cell --------------------------------------------------------------------
 
 

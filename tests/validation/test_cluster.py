@@ -238,7 +238,27 @@ def _start_processes_of(module: str, fault: str) -> None:
 
     os.environ[faulty_worker.FAULT] = fault
     worker_processes.WORKER_MODULE = module
-    remote.end_idle()
+    remote.end_processes()
+
+
+_INTERRUPTED_WHILE_A_CHUNK_HANGS = """
+import os, signal, threading
+from tests.validation import faulty_worker
+from urdfkin.validation import worker_processes
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.cluster import connect_cluster
+
+os.environ[faulty_worker.FAULT] = "hang"
+worker_processes.WORKER_MODULE = faulty_worker.MODULE
+threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+with connect_cluster("local:1") as engine:
+    assert validate("ur5", samples=0, executor=engine).interrupted
+"""
+
+
+def test_an_interrupt_ends_a_local_cluster_with_a_chunk_that_never_ends() -> None:
+    process = subprocess.run(python_command(_INTERRUPTED_WHILE_A_CHUNK_HANGS), timeout=25, check=False)
+    assert process.returncode == 0
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))

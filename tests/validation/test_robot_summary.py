@@ -208,3 +208,14 @@ def test_a_robot_with_a_second_oracle_is_compared_with_it_in_a_validation() -> N
     for source in ("planar_two_link", str(catalogue()["planar_two_link"].path)):
         report = validate(urdfkin.load(source, oracle="mujoco"), samples=1)
         assert all(stats.cross_check for stats in report.robots[0].stats_of("placement"))
+
+
+def test_a_report_refuses_an_unknown_quantity_or_key() -> None:
+    report = validate("planar_two_link", samples=1).robots[0]
+    with pytest.raises(urdfkin.UnknownNameError, match="did you mean placement") as error:
+        report.stats_of("placment")
+    assert "unknown quantity 'placment'" in str(error.value)
+    keys: list[Any] = [("placment", "world"), ("velocity", "global"), "velocity", ["velocity"], None]
+    for key in keys:
+        with pytest.raises(urdfkin.InputError, match="the report does not contain this key"):
+            report.replay(key)

@@ -4,6 +4,7 @@ import io
 import struct
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,18 @@ def test_the_player_plays_to_the_end_at_the_chosen_speed_and_a_pause_holds_the_s
     time.sleep(0.6)
     assert player.sample == kept < 8
     player.speed.value = "1"
+
+
+def test_two_samples_at_unix_times_are_displayed_with_different_times() -> None:
+    robot = without_shapes("planar_two_link")
+    motion = make_line_trajectory(robot, np.zeros(2), np.ones(2), 0.5, 3)
+    motion = replace(motion, t=motion.t + 1.7e9)
+    with shown_robot(robot, trajectory=motion) as viewer:
+        assert viewer.player is not None
+        assert "t = 1700000000 s" in viewer.player.words.content
+        viewer.player.show(1)
+        assert "t = 1700000000.25 s" in viewer.player.words.content
+        assert [mark.label for mark in viewer.player.time._marks] == ["1700000000", "1700000000.5"]
 
 
 def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer, player: Player) -> None:

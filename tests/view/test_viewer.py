@@ -23,6 +23,7 @@ from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import parse_finite
+from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.view.scene import Shape
 from urdfkin.view.server import new_server, open_page
@@ -30,6 +31,7 @@ from urdfkin.view.stage import camera
 from urdfkin.view.viewer import (
     Viewer,
     coordinate_rows,
+    describe_motion,
     fixed_coordinates,
     format_values,
     missing_words,
@@ -464,3 +466,9 @@ def test_the_view_command_serves_until_an_interrupt(tmp_path: Path, plays: bool)
             assert process.wait(timeout=30) == 0
         finally:
             process.kill()
+
+
+def test_a_position_beyond_1e296_m_is_not_displayed_as_infinite() -> None:
+    slide = loaded(robot_of(joint("slide", "prismatic", "a", "b", more=limit(-1e301, 1e301))))
+    motion = frame_motion(slide, ([[1e300]], [[0.0]], [[0.0]]), "b", "world")
+    assert "| position [m] | 0 | 0 | 1e+300 |" in describe_motion(motion)

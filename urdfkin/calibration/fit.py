@@ -429,7 +429,7 @@ class _LeastSquares:
         chi_squares = np.einsum("si,sij,sj->s", own, inverse, own)
         redundancies = np.clip(np.einsum("sii->si", redundancy), 0.0, 1.0)
         residuals = _residuals_of_poses(self.measurements, frames[:, -1])
-        return Fit(parameter_values, residuals, self.noise, half @ half.T, redundancies, chi_squares)
+        return Fit(parameter_values.copy(), residuals, self.noise, half @ half.T, redundancies, chi_squares)
 
 
 def reject_outliers(

@@ -136,7 +136,7 @@ def find_structure(screws: ProductOfExponentials) -> Structure:
         pairs,
         tuple(kinds),
         _reach_bound(screws, origin),
-        float(np.linalg.norm(tips - origin, axis=-1).max()),
+        float(_length(tips - origin).max()),
         tuple(origin.tolist()),
         reach_point,
         tuple(_find_solvers(letters, kinds, pairs)),
@@ -144,6 +144,11 @@ def find_structure(screws: ProductOfExponentials) -> Structure:
 
 
 # -- axes ----------------------------------------------------------------------------------------------
+
+
+def _length(x: FloatArray) -> FloatArray:
+    # Squares of lengths could overflow or underflow, but np.hypot does not.
+    return np.asarray(np.hypot.reduce(x, axis=-1))
 
 
 def _axis(screws: ProductOfExponentials, i: int) -> FloatArray:
@@ -159,7 +164,7 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
     if screws.joints[i].kind.turns and screws.joints[i + 1].kind.turns:
         between = screws.points[i + 1] - screws.points[i]
         is_parallel = angle < NEAR_ANGLE
-        normal = np.linalg.norm(np.cross(z, between)) if is_parallel else abs(cross @ between) / np.sin(angle)
+        normal = _length(np.cross(z, between)) if is_parallel else abs(cross @ between) / np.sin(angle)
         distance = float(normal)
     return AxisPair(screws.joints[i].name, screws.joints[i + 1].name, angle, distance)
 
@@ -171,7 +176,7 @@ def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
         A, b = A + across, b + across @ screws.points[i]
     point = np.asarray(np.linalg.lstsq(A, b, rcond=_RANK_TOLERANCE)[0], np.float64)
-    distances = [np.linalg.norm(np.cross(_axis(screws, i), point - screws.points[i])) for i in indices]
+    distances = [_length(np.cross(_axis(screws, i), point - screws.points[i])) for i in indices]
     return point, float(max(distances))
 
 
@@ -271,9 +276,9 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
             continue
         z = _axis(screws, i)
         nearest = screws.points[i] + z * float(z @ (point - screws.points[i]))
-        total += float(np.linalg.norm(nearest - point))
+        total += float(_length(nearest - point))
         point = nearest
-    return total + float(np.linalg.norm(screws.M[:3, 3] - point))
+    return total + float(_length(screws.M[:3, 3] - point))
 
 
 def _sample_tips_and_jacobian(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:

@@ -126,6 +126,8 @@ def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 
 
 def pi_fraction(radians: float) -> Fraction | None:
     """Return an angle as a fraction of pi, or None if it is not exactly a multiple of pi/12."""
+    if math.isinf(radians * 12.0):
+        return None
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 

@@ -15,10 +15,11 @@ from urdfkin.dh.export.text import table_document
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
-from urdfkin.errors import UnknownNameError
+from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import DEFAULT_QUANTITIES, FORMS
 from urdfkin.export.code import FrameCode, make_verified_code
 from urdfkin.export.naming import safe_name, unique_safe_names
+from urdfkin.model.chain import joints_between
 from urdfkin.model.reference import Reference
 from urdfkin.system.lazy_import import get_hook
 from urdfkin.urdf.findings import UrdfWarning
@@ -41,6 +42,14 @@ def make_robot_code(
         return make_verified_code(
             robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify
         )
+    for joint, _ in joints_between(robot.tree, frame, robot.base_frame):
+        if joint.kind.nq and not joint.kind.has_axis:
+            raise InputError(
+                f"the form {form} cannot contain a {joint.kind.value} joint",
+                where=f"joint {joint.name}",
+                found=f"this joint lies between {robot.base_frame} and {frame}",
+                remedy="use the form tree, or another frame",
+            )
     chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)
     code = make_chain_code(chain, quantities, reference, name=name, verify=verify)
     return replace(code, maybe_proof=replace(code.proof, lock=robot.origin.lock))

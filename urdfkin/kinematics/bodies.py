@@ -32,6 +32,7 @@ for J is analytical Jacobian.
 | axis | a length other than 1 |
 | rotation matrix | a matrix that is not a rotation |
 
+Functions raise RangeError if a result leaves the range of double precision.
 An unknown `representation` raises UnknownNameError. Functions with the argument `nearest` raise
 RepresentationSingularityError within this distance of the singularity of Euler angles.
 """
@@ -54,6 +55,8 @@ from urdfkin.kinematics.inputs import (
     as_rotations,
     as_unit_vectors,
     as_vectors,
+    check_range,
+    range_checked,
 )
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.kinematics.rotation import (
@@ -91,6 +94,7 @@ class MovingFrame:
             object.__setattr__(self, entry.name, array)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
@@ -108,7 +112,7 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
     w_12, alpha_12 = eq.rotate(R, inner.w_0_1), eq.rotate(R, inner.alpha_0_1)
-    return MovingFrame(
+    composed = (
         R @ inner.R_0_1,
         outer.d_0_1 + d_12,
         w + w_12,
@@ -116,6 +120,7 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
         eq.free_angular_acceleration(outer.alpha_0_1, w, w_12, alpha_12),
         eq.moving_point_acceleration(outer.a_0_1, outer.alpha_0_1, w, d_12, v_12, a_12),
     )
+    return MovingFrame(*map(check_range, composed))
 
 
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
@@ -141,6 +146,11 @@ def relative_pose(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None =
 _ZERO = (0.0, 0.0, 0.0)
 
 
+@range_checked
+def _sum_parts(*parts: FloatArray) -> FloatArray:
+    return reduce(np.add, parts)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
     """The three terms w x p, R v_1 and d-dot of a point's velocity (7.124), in m/s."""
@@ -151,7 +161,7 @@ class VelocityParts:
 
     @property
     def total(self) -> FloatArray:
-        return self.rotation + self.relative + self.origin
+        return _sum_parts(self.rotation, self.relative, self.origin)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,15 +176,17 @@ class AccelerationParts:
 
     @property
     def total(self) -> FloatArray:
-        return self.transverse + self.centripetal + self.coriolis + self.relative + self.origin
+        return _sum_parts(self.transverse, self.centripetal, self.coriolis, self.relative, self.origin)
 
 
+@range_checked
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
     """Return p_0 = d_01 + R p_1 (7.58)."""
     p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, as_vectors(p_1, "p_1"))
     return p_0
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
     """Return the terms of a point's velocity (7.124; 7.59 if v_1 = 0).
 
@@ -183,9 +195,10 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
     relative = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
-    return VelocityParts(*np.broadcast_arrays(rotation, relative, frame.v_0_1))
+    return VelocityParts(*map(check_range, np.broadcast_arrays(rotation, relative, frame.v_0_1)))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def point_acceleration(
     frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
@@ -200,9 +213,11 @@ def point_acceleration(
     a_0 = eq.rotate(frame.R_0_1, as_vectors(a_1, "a_1"))
     transverse = eq.transverse(frame.alpha_0_1, p_0)
     centripetal, coriolis = eq.centripetal(frame.w_0_1, p_0), eq.coriolis(frame.w_0_1, v_0)
-    return AccelerationParts(*np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1))
+    parts = np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1)
+    return AccelerationParts(*map(check_range, parts))
 
 
+@range_checked
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
     """Return d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64)."""
     vector: FloatArray = eq.interorigin_vector(
@@ -217,6 +232,7 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
     return w if as_bool(turns, "turns") else np.zeros_like(w)
 
 
+@range_checked
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
@@ -234,6 +250,7 @@ def interorigin_velocity(
     return rotation if as_bool(turns, "turns") else rotation + sliding
 
 
+@range_checked
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
     """Return a column of the velocity Jacobian (7.80, 7.85).
 
@@ -270,12 +287,14 @@ def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
     return as_finite(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
+@range_checked
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
     """Return d-dot_01 = a theta-dot y1 (7.2, 7.4, 7.7)."""
     speed = as_finite(length, "length") * as_finite(rate, "rate")
     return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
 
+@range_checked
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     """Convert the velocity of frame n to the velocity of the tool.
 
@@ -326,6 +345,7 @@ def pose_rate_inverse(
     return _block_diagonal(euler_rate_inverse(representation, euler_of(representation, R), nearest))
 
 
+@range_checked
 def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
 ) -> FloatArray:
@@ -333,12 +353,14 @@ def analytical_jacobian(
     return pose_rate_inverse(representation, R, nearest) @ _as_matrices_with_rows(J_v, "J_v", 6)
 
 
+@range_checked
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
     """Return the velocity Jacobian J_v = C J (7.121)."""
     C = pose_rate_matrix(representation, R)
     return C @ _as_matrices_with_rows(J, "J", C.shape[-1])
 
 
+@range_checked
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
 ) -> FloatArray:
@@ -347,6 +369,7 @@ def pose_rates(
     return (pose_rate_inverse(representation, R, nearest) @ column)[..., 0]
 
 
+@range_checked
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
     """Return [d-dot; w] = C x-dot (7.119)."""
     C = pose_rate_matrix(representation, R)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +66,24 @@ def check_range(result: FloatArray) -> FloatArray:
     if not np.isfinite(result).all():
         raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
     return result
+
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result", bound=FloatArray | tuple[FloatArray, ...])
+
+
+def range_checked(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Make a function raise RangeError if a result is not finite, without NumPy's warnings."""
+
+    @wraps(function)
+    def checked(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+        with np.errstate(over="ignore", invalid="ignore"):
+            result = function(*args, **kwargs)
+        for array in result if isinstance(result, tuple) else (result,):
+            check_range(array)
+        return result
+
+    return checked
 
 
 def common_batch_shape(shapes: Iterable[tuple[int, ...]], what: str = "the arguments") -> tuple[int, ...]:
@@ -134,6 +154,7 @@ def as_unit_vectors(value: ArrayLike, name: str) -> FloatArray:
     return array
 
 
+@np.errstate(over="ignore", invalid="ignore")  # If the determinant overflows, R is not a rotation.
 def as_rotations(value: ArrayLike, name: str) -> FloatArray:
     array = as_matrices(value, name)
     defect = rotation_defect(array).max(initial=0.0)

@@ -22,6 +22,8 @@ The dots stand for any batch shape. Results have the batch shape of the argument
 | axis, quaternion | a length other than 1 |
 | `frame` | an unknown name |
 
+Functions raise RangeError if a result leaves the range of double precision.
+
 A user's matrix often has only a few digits. Quaternions, Euler angles and Gram-Schmidt give different
 rotations for the same rounded matrix. `nearest_rotation` and `polar_factor` return the rotation that is
 nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors, and `polar_factor`
@@ -62,6 +64,7 @@ from urdfkin.kinematics.inputs import (
     as_unit_vectors,
     as_vectors,
     check_range,
+    range_checked,
 )
 from urdfkin.kinematics.number_kinds import array_equations as eq
 
@@ -75,6 +78,7 @@ def skew(w: ArrayLike) -> FloatArray:
     return S
 
 
+@range_checked
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the vector w of S(w) (7.26, 7.37).
 
@@ -91,6 +95,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     return np.stack(pairs, axis=-1) / 2.0
 
 
+@range_checked
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     """Return S(R w) = R S(w) R^T (7.46)."""
     R_0_1 = as_rotations(R_0_1, "R_0_1")
@@ -147,11 +152,13 @@ def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
     return np.stack([*columns, axis], axis=-1) + 0.0  # Adding 0 turns -0 into 0.
 
 
+@range_checked
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
     """Return R-dot = S(w) R (7.38, 7.42)."""
     return skew(as_vectors(w_0_1, "w_0_1")) @ as_rotations(R_0_1, "R_0_1")
 
 
+@range_checked
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return w with S(w) = R-dot R^T (7.35 to 7.38).
 
@@ -161,6 +168,7 @@ def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 
     return unskew(as_matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
+@range_checked
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
     """Return the rate w x p (7.39 to 7.41).
 
@@ -169,6 +177,7 @@ def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
     return np.cross(as_vectors(w_0_1, "w_0_1"), as_vectors(p_0, "p_0"))
 
 
+@range_checked
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     """Add the angular velocities of a chain (7.43 to 7.50).
 
@@ -278,6 +287,7 @@ def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed"
     return (quaternion_rate_matrix(quat, frame) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
+@range_checked
 def angular_velocity_from_quaternion_rates(
     quat: ArrayLike, rates: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
@@ -289,6 +299,7 @@ def angular_velocity_from_quaternion_rates(
     return 4.0 * (E.swapaxes(-1, -2) @ as_vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
 
 
+@range_checked
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
@@ -326,13 +337,13 @@ def _step(
     k3 = _rates(quat + step / 2.0 * k2, middle, frame)
     k4 = _rates(quat + step * k3, last, frame)
     stepped = quat + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    normalised: FloatArray = stepped / np.sqrt((stepped * stepped).sum(axis=-1, keepdims=True))
+    normalised: FloatArray = stepped / check_range(np.sqrt((stepped * stepped).sum(axis=-1, keepdims=True)))
     return normalised
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
     """Return the time derivative (7.57) of a quaternion of any length except 0."""
-    length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
+    length = check_range(np.sqrt((quat * quat).sum(axis=-1, keepdims=True)))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
 
@@ -360,6 +371,7 @@ def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
     return as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(axis, "axis")
 
 
+@range_checked
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
     """Return the velocity of a point p that rotates about the axis k (7.21).
 
@@ -368,6 +380,7 @@ def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatAr
     return np.cross(angular_velocity_about(axis, rate), as_vectors(p, "p"))
 
 
+@range_checked
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the parts of p parallel and perpendicular to k (7.18)."""
     axis, p = as_unit_vectors(axis, "axis"), as_vectors(p, "p")
@@ -558,12 +571,14 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     return axes.reorder(columns).copy()
 
 
+@range_checked
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
     """Return w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
     product = euler_rate_matrix(name, angles) @ as_vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
 
+@range_checked
 def euler_rates(
     name: str, angles: ArrayLike, w: ArrayLike, nearest: float = MIN_SINGULARITY_DISTANCE
 ) -> FloatArray:

@@ -158,7 +158,7 @@ def _start_local_cluster(workers: int) -> Iterator[SpecCluster]:
             try:
                 yield cluster
             finally:
-                remote.end_idle()
+                remote.end_processes()
 
 
 def _check_versions(client: Client) -> None:

@@ -31,7 +31,8 @@ ChunkOutcome = (
 )
 
 _idle: list[WorkerProcess] = []
-_idle_lock = threading.Lock()
+_running: set[WorkerProcess] = set()
+_lock = threading.Lock()
 
 
 def store_robot(robot: bytes) -> bytes:
@@ -58,10 +59,14 @@ def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkO
     return "died", cause
 
 
-def end_idle() -> None:
-    with _idle_lock:
+def end_processes() -> None:
+    """End all processes. A chunk that still runs, for example a chunk that never ends, has no answer."""
+    with _lock:
         while _idle:
             _idle.pop().end()
+        # The thread that waits for the answer closes the connection.
+        while _running:
+            _running.pop().kill()
 
 
 class _CrashError(Exception):
@@ -85,7 +90,7 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 def _reuse_or_start() -> WorkerProcess:
     """Prefer an idle process, because it may already have loaded the robot."""
-    with _idle_lock:
+    with _lock:
         while _idle:
             process = _idle.pop()
             if process.is_alive:
@@ -95,14 +100,31 @@ def _reuse_or_start() -> WorkerProcess:
 
 
 def _run_in(process: WorkerProcess, parcel: _Parcel) -> bytes:
+    with _lock:
+        _running.add(process)
     try:
         process.connection.send(parcel)
         answer = process.connection.recv_bytes()
     except (EOFError, OSError):
-        raise _CrashError(process.wait_for_cause()) from None
+        cause = process.wait_for_cause()
+        if not _remove_running(process):
+            raise RuntimeError("the cluster was closed") from None
+        raise _CrashError(cause) from None
     except BaseException:
+        _remove_running(process)
         process.end()
         raise
-    with _idle_lock:
-        _idle.append(process)
+    if _remove_running(process):
+        with _lock:
+            _idle.append(process)
+    else:
+        process.end()
     return answer
+
+
+def _remove_running(process: WorkerProcess) -> bool:
+    """Return False if `end_processes` has already removed the process."""
+    with _lock:
+        is_running = process in _running
+        _running.discard(process)
+    return is_running

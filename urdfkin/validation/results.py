@@ -14,7 +14,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.system.documents import as_json_data
 from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import get_hook
@@ -96,10 +98,26 @@ class RobotReport:
         return sum(stats.failed for stats in self.error_stats.values())
 
     def stats_of(self, quantity: str) -> list[ErrorStats]:
+        """Return the statistics of a quantity in each reference frame.
+
+        Raise UnknownNameError if there is no such quantity.
+        """
+        if as_str(quantity, "quantity") not in QUANTITIES:
+            raise UnknownNameError("quantity", quantity, QUANTITIES)
         return [stats for (kind, _), stats in self.error_stats.items() if kind == quantity]
 
     def replay(self, key: Key) -> str | None:
-        """Return a command that computes the worst result again; None if nothing was compared."""
+        """Return a command that computes the worst result again; None if nothing was compared.
+
+        Raise InputError if `error_stats` does not contain the key.
+        """
+        if key not in list(self.error_stats):  # A list also compares keys that cannot be hashed.
+            raise InputError(
+                "the report does not contain this key",
+                where=self.name,
+                found=safe_repr(key),
+                remedy="give a key of error_stats, such as ('velocity', 'world')",
+            )
         quantity, reference = key
         if (case := self.error_stats[key].case) is None:
             return None

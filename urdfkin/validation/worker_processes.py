@@ -57,6 +57,9 @@ class WorkerProcess:
     def is_alive(self) -> bool:
         return self._process.poll() is None
 
+    def kill(self) -> None:
+        self._process.kill()
+
     def end(self) -> None:
         self.connection.close()
         self._process.kill()

@@ -64,6 +64,7 @@ _SAMPLE_COUNT = 8
 _ORIENTATION_ROUNDINGS = 16.0
 
 
+@np.errstate(over="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | None:
     """Compare the frames of a chain with Pinocchio's frames.
 
@@ -104,6 +105,7 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
     length = norm(base[..., :3, 3]).max(initial=0.0) + chain.lengths.sum()
     displacements = values[:, [not joint.kind.turns for joint in chain.joints]]
     length += np.abs(displacements).sum(axis=-1).max(initial=0.0)
+    _require_finite_bound(rounding * length, chain)
     bound_ratio = np.maximum(metres / (rounding * length + SMALLEST_SUBNORMAL), direction / rounding)
     if not bound_ratio <= 1.0:
         raise TableError(
@@ -116,6 +118,16 @@ def check_chain(verifier: Verifier, chain: FrameChain, q: FloatArray) -> str | N
         f"origins of {len(chain.joints)} joints and the tip within {metres:.2e} m"
         f" ({bound_ratio:.0%} of the bound)"
     )
+
+
+def _require_finite_bound(bound: FloatArray, chain: FrameChain) -> None:
+    """Raise RangeError for an infinite bound. Every position would be within this bound."""
+    if not np.isfinite(bound).all():
+        raise RangeError(
+            "the bound on a position exceeds the range of double precision",
+            where=f"{chain.robot}, {chain.base} to {chain.tip}",
+            remedy="give smaller numbers",
+        )
 
 
 def check_opw(verifier: Verifier, chain: FrameChain, opw: OpwParameters) -> str | None:
@@ -159,12 +171,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     tilt = sum(joint.pinocchio_tilt for joint in ends)
     rounding = EPS * float(joint_roundings(len(ends), tilt)) + sum_zeroed_tilts(chain)
     allowed = screws.rounding(coordinates) + rounding * lever
-    if not np.isfinite(allowed).all():
-        raise RangeError(
-            "the bound on a position exceeds the range of double precision",
-            where=f"{screws.robot}, {screws.base_frame} to {screws.tip_frame}",
-            remedy="give smaller numbers",
-        )
+    _require_finite_bound(allowed, chain)
     position_ratio = (differences[..., 3].max(axis=-1) / (allowed + SMALLEST_SUBNORMAL)).max(initial=0.0)
     rotation_ratio = (differences[..., :3].max(axis=(-1, -2)) / (rounding + EPS * screws.roundings)).max()
     bound_ratio = np.maximum(position_ratio, rotation_ratio)  # NaN is a disagreement.

@@ -7,6 +7,7 @@ interpolated numbers would be unchecked.
 from __future__ import annotations
 
 import io
+import math
 import threading
 import time
 from typing import Any, Protocol
@@ -51,10 +52,13 @@ class Player:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
         self._playing, self._is_setting = threading.Event(), False
         gui, t = viewer.server.gui, trajectory.t
+        # Unix times such as 1.7e9 s need many digits to differ.
+        ratio = math.log10(np.abs(t).max()) - math.log10(np.diff(t).min())
+        self._digits = min(max(4, math.ceil(ratio) + 2), 17)
         with gui.add_folder("Trajectory"):
             self.time = gui.add_slider(
                 "time [s]", float(t[0]), float(t[-1]), float(np.diff(t).min()), float(t[0]),
-                marks=((float(t[0]), f"{t[0]:g}"), (float(t[-1]), f"{t[-1]:g}")),
+                marks=tuple((float(end), self._format_time(end)) for end in (t[0], t[-1])),
             )  # fmt: skip
             self.time.precision = 4
             self.button = gui.add_button("play")
@@ -84,8 +88,11 @@ class Player:
 
     def _write_text(self) -> None:
         x = self.trajectory
-        sample = f"sample {self.sample + 1} of {len(x.t)}, t = {x.t[self.sample]:.4g} s"
+        sample = f"sample {self.sample + 1} of {len(x.t)}, t = {self._format_time(x.t[self.sample])} s"
         self.words.content = f"**{sample}**\n\n{markdown_text(self._check_line)}"
+
+    def _format_time(self, seconds: float) -> str:
+        return f"{seconds:.{self._digits}g}"
 
     def _nearest_sample(self, seconds: float) -> int:
         return int(np.abs(self.trajectory.t - seconds).argmin())

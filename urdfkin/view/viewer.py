@@ -277,7 +277,7 @@ def legend() -> str:
 
 
 def _number(value: float | FloatArray) -> str:
-    rounded = float(np.round(value, 12))
+    rounded = round(float(value), 12)  # NumPy's `round` returns inf for numbers above 1.8e296.
     return f"{rounded:.4g}" if rounded else "0"
 
 

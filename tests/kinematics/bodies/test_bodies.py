@@ -1,5 +1,7 @@
 """Motions of points and frames agree with positions at 60 digits; also the manipulator Jacobian."""
 
+import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,17 +10,23 @@ import pytest
 from tests.high_precision import angular_acceleration, angular_velocity, array, mp, rate, second_rate
 from tests.kinematics.rotation.strategies import ROUNDING
 from tests.moving import ORIENTATIONS, ORIGINS, T, frame
-from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
+from urdfkin.errors import InputError, RangeError, RepresentationSingularityError, UnknownNameError
 from urdfkin.kinematics.bodies import (
     MovingFrame,
     analytical_jacobian,
     compose,
     compose_all,
     frame_velocity,
+    interorigin_vector,
+    interorigin_velocity,
+    jacobian_column,
+    link_endpoint_velocity,
     orientation_of,
     planar_rotation,
     planar_rotation_derivative,
     point_acceleration,
+    point_position,
+    point_velocity,
     pose_rate_inverse,
     pose_rate_matrix,
     pose_rates,
@@ -169,3 +177,32 @@ def test_the_composition_of_other_values_than_moving_frames_is_refused() -> None
             compose(first, second)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="compose_all needs a list of MovingFrames"):
         compose_all(one)  # type: ignore[arg-type]
+
+
+def test_results_beyond_the_range_of_doubles_raise_a_range_error_without_a_warning() -> None:
+    huge, axis = np.array([1.7e308, -1.7e308, 1.7e308]), np.ones(3) / np.sqrt(3.0)
+    R = exp_rotation([0.1, 0.2, 0.3])
+    moving = MovingFrame(R, huge, huge, huge, huge, huge)
+    parts = point_velocity(MovingFrame(np.eye(3), np.zeros(3), v_0_1=huge), np.zeros(3), huge)
+    six = np.full(6, 1.7e308)
+    calls: list[Callable[[], object]] = [
+        lambda: compose_all([moving, moving]),
+        lambda: point_position(moving, huge),
+        lambda: point_velocity(moving, huge),
+        lambda: parts.total,
+        lambda: point_acceleration(moving, huge),
+        lambda: interorigin_vector(1.7e308, axis, 1.7e308, axis),
+        lambda: interorigin_velocity(huge, huge, axis, 1.0, turns=True),
+        lambda: jacobian_column(axis, huge, turns=True),
+        lambda: link_endpoint_velocity(0.3, 1e200, 1e200),
+        lambda: tool_velocity(six, huge),
+        lambda: analytical_jacobian("ZYZ", R, np.full((6, 2), 1.7e308)),
+        lambda: velocity_jacobian("quaternion", R, np.full((7, 2), 1.7e308)),
+        lambda: pose_rates("ZYZ", R, six),
+        lambda: velocity_of_pose_rates("ZYZ", R, six),
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for call in calls:
+            with pytest.raises(RangeError):
+                call()

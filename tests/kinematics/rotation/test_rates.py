@@ -1,5 +1,6 @@
 """Rates of rotations, Euler angles and quaternions agree with derivatives at 60 digits."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -10,13 +11,14 @@ from hypothesis import strategies as st
 
 from tests.high_precision import angular_velocity, array, mp, turn
 from tests.kinematics.rotation.strategies import ROUNDING, angles, axes, vectors3
-from urdfkin.errors import RepresentationSingularityError
+from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import (
     EULER_SEQUENCES,
     add_angular_velocities,
     angular_velocity_from_euler_rates,
     angular_velocity_from_quaternion_rates,
+    circular_velocity,
     euler_condition,
     euler_rate_inverse,
     euler_rate_matrix,
@@ -27,10 +29,16 @@ from urdfkin.kinematics.rotation import (
     quaternion_of,
     quaternion_rate_matrix,
     quaternion_rates,
+    rotate_skew,
     rotation_about,
     rotation_from_euler,
     rotation_from_quaternion,
+    rotation_rate,
     singularity_distance,
+    skew,
+    split_along,
+    turning_vector_rate,
+    unskew,
 )
 
 
@@ -198,3 +206,28 @@ def test_angular_velocity_in_the_body_frame_integrates_to_the_same_orientation()
     start = quaternion_of(rotation_from_euler("ZYZ", zyz(0.0)))
     quat = integrate_orientation(in_body, start, np.linspace(0, 2, 401), "body")[-1]
     assert np.abs(rotation_from_quaternion(quat) - rotation_from_euler("ZYZ", zyz(2.0))).max() < 1e-8
+
+
+def test_rates_beyond_the_range_of_doubles_raise_a_range_error_without_a_warning() -> None:
+    huge, axis, R = np.full(3, 1.7e308), np.ones(3) / np.sqrt(3.0), exp_rotation([0.1, 0.2, 0.3])
+    quat = quaternion_of(R)
+    calls: list[Callable[[], object]] = [
+        lambda: unskew(skew(huge)),
+        lambda: rotate_skew(R, skew(huge)),
+        lambda: rotation_rate(R, huge),
+        lambda: turning_vector_rate([1e200, 2e200, 0.0], [1e200, 0.0, 0.0]),
+        lambda: add_angular_velocities(np.stack([R, R]), np.stack([huge, huge])),
+        lambda: angular_velocity_from_quaternion_rates(quat, np.full(4, 1.7e308)),
+        lambda: integrate_orientation(lambda _: [1e200, 0.0, 0.0], quat, [0.0, 1.0]),
+        lambda: circular_velocity(axis, 1e200, [1e200, 0.0, 0.0]),
+        lambda: split_along(axis, huge),
+        lambda: angular_velocity_from_euler_rates("ZYZ", [0.1, 0.5, 0.2], huge),
+        lambda: euler_rates("ZYZ", [0.1, 1e-8, 0.2], huge),
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for call in calls:
+            with pytest.raises(RangeError):
+                call()
+        with pytest.raises(InputError):
+            rotation_rate(1e200 * np.eye(3), [0.0, 0.0, 1.0])

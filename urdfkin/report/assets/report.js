@@ -134,7 +134,9 @@
     if (!robot.open || robot.dataset.asked) return;
     robot.dataset.asked = "yes";
     waiting.set(Number(robot.id.slice("robot-".length)), robot);
-    const script = Object.assign(document.createElement("script"), { src: robot.dataset.file });
+    // The name of the page may contain #, ? or %.
+    const src = robot.dataset.file.split("/").map(encodeURIComponent).join("/");
+    const script = Object.assign(document.createElement("script"), { src });
     script.addEventListener("error", () => { delete robot.dataset.asked; missing(robot, "is not there"); });
     script.addEventListener("load", () => script.remove());
     document.head.append(script);
