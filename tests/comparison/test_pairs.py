@@ -312,6 +312,44 @@ def test_a_robot_with_planar_joints_is_found_with_few_common_links(
         assert certified(found, a, b)
 
 
+@pytest.mark.parametrize(
+    ("kinds", "common"),
+    [
+        ("planar continuous", {0}),
+        ("continuous planar", {2}),
+        ("continuous planar continuous", {1}),
+        ("floating continuous planar", {0, 2}),
+        ("planar planar continuous", {0, 1}),
+    ],
+)
+def test_random_chains_with_planar_and_floating_joints_are_found_with_few_common_links(
+    kinds: str, common: set[int]
+) -> None:
+    rng = np.random.default_rng(0)
+    a = built(
+        *(
+            joint(
+                f"j{i}",
+                kind,
+                f"l{i}",
+                f"l{i + 1}",
+                'xyz="{} {} {}" rpy="{} {} {}"'.format(*rng.normal(size=6)),
+                "1 2 3" if kind == "continuous" else "",
+            )
+            for i, kind in enumerate(kinds.split())
+        ),
+        verify=False,
+    )
+    moved = pairs.counted_elsewhere(pairs.on_a_stand(pairs.shifted(pairs.flipped(a.tree))))
+    joints = {one.name: f"other_{one.name}" for one in moved.joints}
+    links = {link: link if link in {f"l{i}" for i in common} else f"other_{link}" for link in moved.links}
+    other = pairs.with_names(moved, joints, links)
+    found = urdfkin.same(a, loaded(other))
+    assert found.verdict is Verdict.SAME_AFTER
+    assert moves_alike(found, a, loaded(other))
+    assert certified(found, a, loaded(other))
+
+
 def test_a_common_link_after_the_first_joint_fixes_the_base() -> None:
     a = built(joint("j", "revolute", "base", "arm", 'xyz="0.22 0 0"', "0 1 0", limit(-1, 1)), verify=False)
     moved = pairs.on_a_stand(a.tree)

@@ -927,7 +927,7 @@ def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignmen
     if agrees or best.only_a or best.only_b or not 0 < len(best.steps) <= MAX_REFINED_JOINTS:
         return best
     for start in _starts_of_refinement(best, name_map):
-        if any(step.kind not in ("turns", "prismatic") or step.kind_difference for step in start.steps):
+        if any(step.kind_difference for step in start.steps):
             continue
         for with_links in (False,) if best.has_free_frames else (True, False):
             refined = refine_choices(start, with_links=with_links)
