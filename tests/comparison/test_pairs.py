@@ -313,30 +313,33 @@ def test_a_robot_with_planar_joints_is_found_with_few_common_links(
 
 
 @pytest.mark.parametrize(
-    ("kinds", "common"),
+    ("kinds", "parents", "common", "seed"),
     [
-        ("planar continuous", {0}),
-        ("continuous planar", {2}),
-        ("continuous planar continuous", {1}),
-        ("floating continuous planar", {0, 2}),
-        ("planar planar continuous", {0, 1}),
+        ("planar continuous", "01", {0}, 0),
+        ("continuous planar", "01", {2}, 0),
+        ("continuous planar continuous", "012", {1}, 0),
+        ("floating continuous planar", "012", {0, 2}, 0),
+        ("planar planar continuous", "012", {0, 1}, 0),
+        ("floating prismatic prismatic", "012", {0, 2}, 0),
+        ("floating planar continuous planar", "0103", {2, 4}, 4),
     ],
 )
-def test_random_chains_with_planar_and_floating_joints_are_found_with_few_common_links(
-    kinds: str, common: set[int]
+def test_random_robots_with_planar_and_floating_joints_are_found_with_few_common_links(
+    kinds: str, parents: str, common: set[int], seed: int
 ) -> None:
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     a = built(
         *(
             joint(
                 f"j{i}",
                 kind,
-                f"l{i}",
+                f"l{parent}",
                 f"l{i + 1}",
                 'xyz="{} {} {}" rpy="{} {} {}"'.format(*rng.normal(size=6)),
-                "1 2 3" if kind == "continuous" else "",
+                "1 2 3" if kind in ("continuous", "prismatic") else "",
+                limit() if kind == "prismatic" else "",
             )
-            for i, kind in enumerate(kinds.split())
+            for i, (kind, parent) in enumerate(zip(kinds.split(), parents, strict=True))
         ),
         verify=False,
     )

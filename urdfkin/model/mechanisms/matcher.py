@@ -798,6 +798,7 @@ def align(
         named = _with_refined_axes(named, name_map)
         if named.is_complete and not named.has_separated_names:
             best = named
+    first = best
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.is_complete:
             break
@@ -808,6 +809,10 @@ def align(
             candidate = _best_alignment(a, other, name_map, None)
             if _is_better_alignment(candidate, best):
                 best = candidate
+    if best is not first and not best.matches_all_common_links:
+        # A new order of the joints omits links. The fit can make it unnecessary.
+        refined = _with_refined_axes(first, name_map)
+        best = refined if refined.is_complete else best
     best = _with_refined_axes(_with_exchanged_joints(best, name_map), name_map)
     best = _with_larger_tolerances(_with_another_start(best, b, name_map), name_map)
     return _with_zeros_by_mimic_rules(best)
@@ -929,11 +934,16 @@ def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignmen
     for start in _starts_of_refinement(best, name_map):
         if any(step.kind_difference for step in start.steps):
             continue
-        for with_links in (False,) if best.has_free_frames else (True, False):
-            refined = refine_choices(start, with_links=with_links)
-            exact = _best_alignment(best.a, best.b, start.names, refined)
-            if exact.all_joints_agree and _is_better_alignment(exact, best):
-                return exact
+        # The links can lead the fit to a wrong solution.
+        # Then the last fit starts where all axes coincide.
+        tried = start
+        for with_links in (False,) if best.has_free_frames else (True, False, True):
+            if with_links and tried is not start and not tried.all_joints_agree:
+                break
+            refined = refine_choices(tried if with_links else start, with_links=with_links)
+            tried = _best_alignment(best.a, best.b, start.names, refined)
+            if tried.all_joints_agree and _is_better_alignment(tried, best):
+                return tried
     return best
 
 
