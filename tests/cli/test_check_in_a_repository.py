@@ -331,8 +331,14 @@ def test_a_baseline_written_for_some_files_keeps_the_findings_of_other_files(her
     assert json.loads(Path("known.json").read_text())["findings"] == []
 
 
+_INFINITE_COUNT = (
+    '{"schema": "urdfkin-baseline", "version": 1, "findings": [{"file": "arm.urdf", "code": "URDF503",'
+    ' "severity": "warning", "element": "", "name": "", "found": "", "count": 1e400}]}'
+)
+
+
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{", '{"schema": "urdfkin-baseline", "version": 2}', "[" * 100_000]
+    "text", ["", "[]", "{", '{"schema": "urdfkin-baseline", "version": 2}', "[" * 100_000, _INFINITE_COUNT]
 )
 def test_an_invalid_baseline_is_refused(here: Path, text: str) -> None:
     put("arm.urdf")
