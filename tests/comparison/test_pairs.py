@@ -316,6 +316,8 @@ def test_a_robot_with_planar_joints_is_found_with_few_common_links(
     ("kinds", "parents", "common", "seed"),
     [
         ("planar continuous", "01", {0}, 0),
+        ("planar continuous", "01", set(), 0),
+        ("planar continuous continuous", "012", set(), 0),
         ("continuous planar", "01", {2}, 0),
         ("continuous planar continuous", "012", {1}, 0),
         ("floating continuous planar", "012", {0, 2}, 0),

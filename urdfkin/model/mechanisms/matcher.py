@@ -168,6 +168,17 @@ class MechanismMatcher:
         assert best is not None
         return best
 
+    def full_matches(self) -> Iterator[Alignment]:
+        """Yield one alignment without unmatched joints for each set of joint pairs."""
+        seen, self.exact = list[dict[str, str]](), None
+        for bodies, X in self._start_candidates():
+            if not self.joint_matcher.has_same_shape(bodies, (None, None)):
+                continue
+            alignment = self._match_from(bodies, X)
+            if not (alignment.only_a or alignment.only_b) and alignment.names not in seen:
+                seen.append(alignment.names)
+                yield alignment
+
     def find_exact(self) -> Alignment | None:
         """Search an exact match from each body pair with links of equal labels."""
         start = None if self.exact is None else self._exact_start(self.exact, self._shared_bodies())
@@ -782,6 +793,8 @@ LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 MAX_REFINED_JOINTS = 100
 #: Maximum number of attempts to exchange partners of joint pairs.
 MAX_EXCHANGES = 12
+#: Maximum number of alignments without unmatched joints that are fitted.
+MAX_FULL_MATCHES = 12
 
 
 def align(
@@ -815,7 +828,7 @@ def align(
         best = refined if refined.is_complete else best
     best = _with_refined_axes(_with_exchanged_joints(best, name_map), name_map)
     best = _with_larger_tolerances(_with_another_start(best, b, name_map), name_map)
-    return _with_zeros_by_mimic_rules(best)
+    return _with_zeros_by_mimic_rules(_with_all_joints(best, b, name_map))
 
 
 def _orders_to_try(
@@ -893,6 +906,25 @@ def _with_another_start(best: Alignment, b: Mechanism, name_map: Mapping[str, st
     matcher = MechanismMatcher(best.a, b, joint_matcher, None, LookAhead(0), tolerance, None)
     exact = matcher.find_exact()
     return exact if exact is not None and exact.matches_all_common_links else best
+
+
+def _with_all_joints(best: Alignment, b: Mechanism, name_map: Mapping[str, str]) -> Alignment:
+    """If joints of both models are unmatched, fit other alignments that match all joints.
+
+    Before a fit, a wrong alignment can have more coincident axes than the correct alignment.
+    """
+    if not (best.only_a and best.only_b):
+        return best
+    tolerance = tolerance_of(best.a, b)
+    joint_matcher = JointMatcher(best.a, b, name_map, tolerance)
+    matcher = MechanismMatcher(
+        best.a, b, joint_matcher, None, LookAhead(MAX_LOOK_AHEAD_PAIRS), tolerance, None
+    )
+    for alignment in islice(matcher.full_matches(), MAX_FULL_MATCHES):
+        refined = _with_refined_axes(alignment, name_map)
+        if refined.is_complete and refined.matches_all_common_links:
+            return refined
+    return best
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
