@@ -300,8 +300,8 @@ def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: 
 
 def test_a_file_with_two_spellings_is_checked_once(here: Path) -> None:
     put("robots/arm.urdf")
-    spellings = "robots", "robots/arm.urdf", "./robots//arm.urdf", str(here / "robots/arm.urdf")
-    assert found(*spellings) == [("robots/arm.urdf", "URDF503")]
+    spellings = "robots", "robots/arm.urdf", "robots/../robots/arm.urdf", str(here / "robots/arm.urdf")
+    assert found(*spellings) == found(*spellings, "./robots//arm.urdf") == [("robots/arm.urdf", "URDF503")]
     assert "known.json: 1 finding in" in check(*spellings, "--write-baseline", "known.json").err
     assert check(*spellings, "--diff").text.count("@@ ") == 1
 
@@ -331,8 +331,14 @@ def test_a_baseline_written_for_some_files_keeps_the_findings_of_other_files(her
     assert json.loads(Path("known.json").read_text())["findings"] == []
 
 
+_INFINITE_COUNT = (
+    '{"schema": "urdfkin-baseline", "version": 1, "findings": [{"file": "arm.urdf", "code": "URDF503",'
+    ' "severity": "warning", "element": "", "name": "", "found": "", "count": 1e400}]}'
+)
+
+
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{", '{"schema": "urdfkin-baseline", "version": 2}', "[" * 100_000]
+    "text", ["", "[]", "{", '{"schema": "urdfkin-baseline", "version": 2}', "[" * 100_000, _INFINITE_COUNT]
 )
 def test_an_invalid_baseline_is_refused(here: Path, text: str) -> None:
     put("arm.urdf")

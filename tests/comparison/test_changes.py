@@ -8,8 +8,10 @@ import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.comparison.pairs import files_of
 from tests.reading import present
+from tests.urdfs import joint
+from tests.urdfs import robot as urdf
 from urdfkin.comparison.diff import ModelChange
-from urdfkin.report.diff import markdown_of
+from urdfkin.report.diff import lines_of, markdown_of
 
 OLD = """<robot name="arm">
   <link name="base"/>
@@ -39,6 +41,22 @@ def test_each_changed_attribute_is_reported_and_equal_values_are_not() -> None:
         "link upper: inertial mass 2 -> 2.5", "link tool: new",
     ]  # fmt: skip
     assert not urdfkin.diff(OLD, OLD.replace("0.4 0 0", "4e-1 0.0 -0"))
+
+
+def test_a_limit_or_a_damping_of_zero_is_not_a_change_if_it_is_the_default() -> None:
+    text = urdf(joint("j", "revolute", "a", "b", more='<limit upper="1" effort="1" velocity="1"/>{}'))
+    old = text.format('<dynamics damping="0.1"/>')
+    new = text.replace("<limit ", '<limit lower="0" ').format('<dynamics damping="0.1" friction="0"/>')
+    assert not urdfkin.diff(old, new)
+    found = urdfkin.diff(old, new.replace('lower="0"', 'lower="-1"'))
+    assert [str(change) for change in found.changes] == ["joint j: limit lower 0 -> -1"]
+
+
+def test_a_floating_joint_that_becomes_planar_has_no_proven_bound() -> None:
+    old, new = (urdf(joint("j", kind, "a", "b")) for kind in ("floating", "planar"))
+    found = urdfkin.diff(old, new)
+    assert [str(effect) for effect in found.effects] == ["alone moves b without a proven bound"]
+    assert lines_of(found)[-1].endswith("; together they move b without a proven bound")
 
 
 def test_the_effect_of_each_joint_and_the_total_effect_are_reported() -> None:

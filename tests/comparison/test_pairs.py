@@ -312,6 +312,49 @@ def test_a_robot_with_planar_joints_is_found_with_few_common_links(
         assert certified(found, a, b)
 
 
+@pytest.mark.parametrize(
+    ("kinds", "parents", "common", "seed"),
+    [
+        ("planar continuous", "01", {0}, 0),
+        ("planar continuous", "01", set(), 0),
+        ("planar continuous continuous", "012", set(), 0),
+        ("continuous planar", "01", {2}, 0),
+        ("continuous planar continuous", "012", {1}, 0),
+        ("floating continuous planar", "012", {0, 2}, 0),
+        ("planar planar continuous", "012", {0, 1}, 0),
+        ("floating prismatic prismatic", "012", {0, 2}, 0),
+        ("floating planar continuous planar", "0103", {2, 4}, 4),
+    ],
+)
+def test_random_robots_with_planar_and_floating_joints_are_found_with_few_common_links(
+    kinds: str, parents: str, common: set[int], seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    a = built(
+        *(
+            joint(
+                f"j{i}",
+                kind,
+                f"l{parent}",
+                f"l{i + 1}",
+                'xyz="{} {} {}" rpy="{} {} {}"'.format(*rng.normal(size=6)),
+                "1 2 3" if kind in ("continuous", "prismatic") else "",
+                limit() if kind == "prismatic" else "",
+            )
+            for i, (kind, parent) in enumerate(zip(kinds.split(), parents, strict=True))
+        ),
+        verify=False,
+    )
+    moved = pairs.counted_elsewhere(pairs.on_a_stand(pairs.shifted(pairs.flipped(a.tree))))
+    joints = {one.name: f"other_{one.name}" for one in moved.joints}
+    links = {link: link if link in {f"l{i}" for i in common} else f"other_{link}" for link in moved.links}
+    other = pairs.with_names(moved, joints, links)
+    found = urdfkin.same(a, loaded(other))
+    assert found.verdict is Verdict.SAME_AFTER
+    assert moves_alike(found, a, loaded(other))
+    assert certified(found, a, loaded(other))
+
+
 def test_a_common_link_after_the_first_joint_fixes_the_base() -> None:
     a = built(joint("j", "revolute", "base", "arm", 'xyz="0.22 0 0"', "0 1 0", limit(-1, 1)), verify=False)
     moved = pairs.on_a_stand(a.tree)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.comparison.pairs import written
+from tests.comparison.pairs import counted_elsewhere, loaded, written
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.bounds import tighten
@@ -263,6 +263,16 @@ def test_a_recheck_rejects_a_certificate_with_forged_contents(
     assert recheck(document, a, b) == []
     forge(document)
     assert any(words in line for line in recheck(document, a, b))
+
+
+def test_a_recheck_accepts_other_rounding_errors_of_a_conversion() -> None:
+    a = built(joint("far", "planar", "world", "base", 'xyz="6 0 6"', axis=""), verify=False)
+    b = loaded(counted_elsewhere(a.tree))
+    document = written(urdfkin.same(a, b))
+    before = document["joints"][0]["conversion"]["before"]
+    for size, accepted in ((1e-14, True), (1e-9, False)):
+        before[2][0] += size
+        assert (recheck(document, a, b) == []) is accepted
 
 
 def test_a_recheck_rejects_the_verdict_differs_if_another_alignment_agrees(

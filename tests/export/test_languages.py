@@ -1,7 +1,10 @@
 """Exported files run and compute true values; a wrong file reports its error."""
 
 import ast
+import copy
+import importlib.machinery
 import importlib.util
+import pickle
 import re
 import shutil
 import subprocess
@@ -490,6 +493,17 @@ def test_functions_of_pytorch_refuse_an_input_that_is_no_tensor_of_floating_numb
     refuses(velocity, whole, right, TypeError, "needs a floating type: found .*int64")
     words = r"needs 2 numbers on its last axis: found the shape \(1,\)"
     refuses(velocity, right[:1], right, ValueError, words)
+
+
+def test_a_module_of_pytorch_can_be_pickled_with_its_attributes(monkeypatch: pytest.MonkeyPatch) -> None:
+    torch = _torch(lambda *_, **__: True)
+    torch.__spec__ = importlib.machinery.ModuleSpec("torch", None)
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    own, q = urdfkin.load("planar_two_link").torch("tip"), torch.tensor([0.1, 0.2], dtype=np.float64)
+    own.training = False
+    for again in (pickle.loads(pickle.dumps(own)), copy.deepcopy(own)):
+        assert again.training is False
+        assert np.array_equal(again.forward(q), own.forward(q))
 
 
 @pytest.mark.slow

@@ -433,7 +433,7 @@ class CheckRun:
             return
         for file in files:
             # A name such as `panda` is a robot of the catalogue, and `./panda` is a file.
-            path = file if file == Path(file).stem else str(Path(file).absolute())
+            path = file if file == Path(file).stem else str(Path(file).parent.resolve() / Path(file).name)
             if path not in self._paths:
                 self._paths.add(path)
                 self.words[file] = word

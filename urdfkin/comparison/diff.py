@@ -6,6 +6,7 @@ converted to URDF. For files of different formats, `diff` lists the differences 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
@@ -41,6 +42,8 @@ _VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
+_LIMIT_DEFAULTS = {"limit lower": 0.0, "limit upper": 0.0}
+_DYNAMICS_DEFAULTS = {"dynamics damping": 0.0, "dynamics friction": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Values of `ModelChange.what` for changes that move a link.
@@ -90,6 +93,8 @@ def format_value(value: Value | None) -> str:
 
 
 def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
+    if frame.lower == frame.radians_seen == 0.0 and math.isinf(frame.upper):
+        return f"{moves} {frame.frame} without a proven bound"
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {interval_text(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {interval_text(length, frame.lower, frame.upper)}"
@@ -314,6 +319,9 @@ def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
         defaults: dict[str, Value] = dict(_ORIGIN_DEFAULTS)
         defaults |= _AXIS_DEFAULTS if found.get("type") not in ("fixed", "floating") else {}
         defaults |= _MIMIC_DEFAULTS if "mimic joint" in found else {}
+        has_ends = element.find("limit") is not None and found.get("type") in ("revolute", "prismatic")
+        defaults |= _LIMIT_DEFAULTS if has_ends else {}
+        defaults |= _DYNAMICS_DEFAULTS if element.find("dynamics") is not None else {}
         found = defaults | found
     return found
 

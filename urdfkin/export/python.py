@@ -543,7 +543,15 @@ def load_torch_module(text: str) -> Any:
     require_torch()
     scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
     exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)
-    return scope["Kinematics"]()
+    kinematics = scope["Kinematics"]
+
+    def reduce(module: Any, protocol: Any) -> Any:
+        if type(module) is kinematics:  # pickle cannot import this class
+            return load_torch_module, (text,), module.__dict__
+        return super(kinematics, module).__reduce_ex__(protocol)
+
+    kinematics.__reduce_ex__ = reduce
+    return kinematics()
 
 
 def require_torch() -> None:

@@ -752,6 +752,12 @@ def test_a_convention_that_is_written_as_toml_is_read_back(name: str) -> None:
     assert parse_convention(as_toml(given), "text", how.name) == given
 
 
+def test_a_unit_of_a_numpy_type_is_written_as_a_toml_number() -> None:
+    how = Convention(name="x", rules={"j": JointRule(unit=np.float64(360.0))})
+    read = parse_convention(as_toml(how), "text", "x")
+    assert read.rules == how.rules
+
+
 def test_the_methods_of_a_robot_in_a_convention_have_the_argument_names_of_the_robot() -> None:
     shared = [
         name for name in vars(ConventionRobot) if name[0] != "_" and inspect.isfunction(vars(Robot).get(name))

@@ -298,7 +298,8 @@ def as_toml(convention: Convention) -> str:
         lines += [] if rule.sign == 1.0 else ["sign = -1"]
         lines += [] if not rule.zero else [f"zero = {float(rule.zero)!r}"]
         if rule.unit is not None:
-            lines.append(f"unit = {_quote(rule.unit) if isinstance(rule.unit, str) else repr(rule.unit)}")
+            unit = _quote(rule.unit) if isinstance(rule.unit, str) else repr(float(rule.unit))
+            lines.append(f"unit = {unit}")
     return "\n".join(lines) + "\n"
 
 

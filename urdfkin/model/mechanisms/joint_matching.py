@@ -35,11 +35,15 @@ from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     AlignmentChoices,
     Edge,
+    FreeJointConversion,
+    MatchedJoints,
     Mechanism,
     Screw,
     Tolerance,
     angle_from_to,
     line_difference,
+    nearest_planar_pose,
+    out_of_plane_compensation,
     pose_difference,
     screw_motion,
     size_of,
@@ -358,72 +362,161 @@ _NEGLIGIBLE_CHANGE = 1e-14
 
 
 def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoices:
-    """Solve for B's root pose and all zero offsets together, so that all axes of B coincide with axes of A.
+    """Solve for B's root pose, all zero offsets and all conversions together.
 
-    `MechanismMatcher` finds one zero offset after another. This fails if an axis depends on two unknown
+    With the solution, all axes of B coincide with axes of A. `MechanismMatcher` finds one zero offset after another. This fails if an axis depends on two unknown
     offsets, or if nearly parallel axes magnify the rounding error of an offset.
 
     Args:
-        alignment: Every joint is revolute or prismatic.
+        alignment: The joints of each pair have the same kind.
         with_links: Whether matched links of B must also coincide with links of A.
     """
-    size = size_of(alignment.a, alignment.b)
-    turns = np.array([step.kind == "turns" for step in alignment.steps])
+    size, steps = size_of(alignment.a, alignment.b), _refined_steps(alignment)
+    turns = np.array([turning for step in steps for _, turning in step.screws])
     # A rotation of 1 rad and a shift by `size` displace links by about the same distance.
     scales = np.concatenate(([1.0] * 3, [size] * 3, np.where(turns, 1.0, size)))
-    X, offsets = alignment.X, np.array([step.offset for step in alignment.steps])
+    X, values = alignment.X, np.concatenate([step.values for step in steps])
     for _ in range(_REFINEMENT_STEPS):
-        r, J = _errors(alignment, X, offsets, size, with_links=with_links)
+        r, J, _ = _errors(alignment, steps, X, values, size, with_links=with_links)
         change = scales * np.linalg.lstsq(J * scales, -r, rcond=None)[0]
-        X, offsets = pose(exp_rotation(change[:3]), change[3:6]) @ X, offsets + change[6:]
+        X, values = pose(exp_rotation(change[:3]), change[3:6]) @ X, values + change[6:]
         if np.abs(change).max() < _NEGLIGIBLE_CHANGE:
             break
         # If two axes nearly coincide, a step can add many turns. Large angles have large rounding errors.
-        offsets = np.where(turns & (np.abs(offsets) > pi), np.remainder(offsets + pi, 2.0 * pi) - pi, offsets)
-    joints = alignment.a.tree.joints
-    zeros = {joints[s.a].name: (s.sense, float(x)) for s, x in zip(alignment.steps, offsets, strict=True)}
-    return replace(alignment.choices, X=X, zeros=zeros)
+        values = np.where(turns & (np.abs(values) > pi), np.remainder(values + pi, 2.0 * pi) - pi, values)
+    motions = _errors(alignment, steps, X, values, size, with_links=with_links)[2]
+    joints, k = alignment.a.tree.joints, 0
+    zeros, conversions = dict[str, tuple[int, float]](), dict[str, FreeJointConversion]()
+    for one, refined, motion in zip(alignment.steps, steps, motions, strict=True):
+        if refined.kind is None:
+            zeros[joints[one.a].name] = one.sense, float(values[k])
+        else:
+            before = motions[one.previous] if one.previous >= 0 else X
+            conversions[joints[one.a].name] = _conversion(alignment, one, refined, before, motion)
+        k += len(refined.screws)
+    return replace(alignment.choices, X=X, zeros=zeros, conversions=conversions)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _RefinedStep:
+    """A joint of B in a fit. It moves B's later bodies by `start @ exp(S_1 v_1) ... exp(S_k v_k)`.
+
+    Attributes:
+        kind: Planar or floating; None for a joint with one zero offset.
+        is_reversed: Whether the path crosses the joint from child to parent.
+        start: (4, 4) motion before the screws, in B's root frame.
+        screws: The screws S in B's root frame, and whether each screw is a rotation.
+        values: (k,) values v at the start of the fit.
+    """
+
+    edge: Edge
+    kind: JointKind | None
+    is_reversed: bool
+    start: FloatArray
+    screws: Sequence[tuple[Screw, bool]]
+    values: FloatArray
+
+
+def _refined_steps(alignment: Alignment) -> list[_RefinedStep]:
+    b, found = alignment.b, list[_RefinedStep]()
+    edges = {edge.joint: edge for edge in b.edges}
+    for step in alignment.steps:
+        edge = edges[step.b]
+        if step.previous >= 0:
+            previous = found[step.previous]
+            body = previous.edge.inner if previous.is_reversed else previous.edge.outer
+        else:
+            body = b.body_of[alignment.base[1]]
+        back = edge.outer == body
+        if step.kind in ("turns", "prismatic"):
+            screw = b.screw(edge).reverse() if back else b.screw(edge)
+            screws, values = [(screw, step.kind == "turns")], np.array([step.offset])
+            found.append(_RefinedStep(edge, None, back, IDENTITY, screws, values))
+            continue
+        T, P = b.zero_poses[edge.joint + 1], IDENTITY
+        if step.conversion is not None:
+            P = step.conversion.before @ step.conversion.behind
+            P = inverse(P) if back else P
+        x, y, z = (Screw(T[:3, i], T[:3, 3]) for i in range(3))
+        screws = [(x, False), (y, False), (z, True)]
+        if step.kind == "floating":
+            screws += [(z, False), (y, True), (x, True)]
+        start, kind = T @ P @ inverse(T), JointKind(step.kind)
+        found.append(_RefinedStep(edge, kind, back, start, screws, np.zeros(len(screws))))
+    return found
+
+
+def _conversion(
+    alignment: Alignment, step: MatchedJoints, refined: _RefinedStep, before: FloatArray, after: FloatArray
+) -> FreeJointConversion:
+    """Return the conversion of a planar or floating joint.
+
+    `before` and `after` (4, 4) move the bodies before and after B's joint.
+    """
+    pose_a, zero_pose_b = alignment.a.zero_poses[step.a + 1], alignment.b.zero_poses[refined.edge.joint + 1]
+    M, N = inverse(before @ zero_pose_b) @ pose_a, inverse(pose_a) @ after @ zero_pose_b
+    if refined.kind is JointKind.PLANAR:
+        compensation = out_of_plane_compensation(M)
+        N = compensation @ nearest_planar_pose(inverse(compensation) @ N)
+    M, N = (inverse(N), inverse(M)) if refined.is_reversed else (M, N)
+    return FreeJointConversion(M, N, step.conversion is not None and step.conversion.back)
 
 
 def _errors(
-    alignment: Alignment, X: FloatArray, offsets: FloatArray, size: float, *, with_links: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Return the differences (k,) of axes and links, m, and their derivatives (k, 6 + n).
+    alignment: Alignment,
+    steps: Sequence[_RefinedStep],
+    X: FloatArray,
+    values: FloatArray,
+    size: float,
+    *,
+    with_links: bool,
+) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+    """Return differences, their derivatives, and the motion (4, 4) of B's bodies after each joint pair.
 
-    The derivatives are with respect to a twist of B's root in A's root frame, and to the n zero offsets.
-    Angles are multiplied by `size`.
+    The differences (k,) of axes and links are in m; angles are multiplied by `size`. The derivatives
+    (k, 6 + n) are with respect to a twist of B's root in A's root frame, and to `values` (n,).
     """
-    b, n = alignment.b, len(offsets)
-    edges = {edge.joint: edge for edge in b.edges}
-    root = b.body_of[alignment.base[1]], X, np.eye(6, 6 + n)
-    # For each joint pair: B's body after the joint, its motion, and the derivatives (6, 6 + n) of its twist.
-    after = list[tuple[int, FloatArray, FloatArray]]()
+    b, n = alignment.b, len(values)
+    # Motions of B's bodies, and the derivatives (6, 6 + n) of their twists: at the root and after each joint.
+    root = X, np.eye(6, 6 + n)
+    after, k = list[tuple[FloatArray, FloatArray]](), 0
     errors, derivatives = list[FloatArray](), list[FloatArray]()
-    for i, step in enumerate(alignment.steps):
-        body, motion, twist = after[step.previous] if step.previous >= 0 else root
-        edge, turns = edges[step.b], step.kind == "turns"
-        screw = b.screw(edge).reverse() if edge.outer == body else b.screw(edge)
-        axis, target = screw.transform(motion), step.axis_a
-        u, p = axis.direction, axis.point
-        errors.append(size * (step.sense * u - target.direction))
-        derivatives.append(-size * step.sense * skew(u) @ twist[:3])
-        if turns:
-            across = np.eye(3) - np.outer(target.direction, target.direction)
-            errors.append(across @ (p - target.point))
-            derivatives.append(across @ (twist[3:] - skew(p) @ twist[:3]))
-        twist = twist.copy()
-        twist[:, 6 + i] = np.concatenate((u, np.cross(p, u)) if turns else (np.zeros(3), u))
-        after.append((edge.other_body(body), motion @ screw_motion(screw, offsets[i], turns=turns), twist))
+    for step, refined in zip(alignment.steps, steps, strict=True):
+        motion, twist = after[step.previous] if step.previous >= 0 else root
+        if step.kind != "floating":
+            screw = refined.screws[0][0] if refined.kind is None else b.screw(refined.edge)
+            axis, target = screw.transform(motion), step.axis_a
+            u, p = axis.direction, axis.point
+            sense = step.sense if refined.kind is None else math.copysign(1.0, u @ target.direction)
+            errors.append(size * (sense * u - target.direction))
+            derivatives.append(-size * sense * skew(u) @ twist[:3])
+            if step.kind == "turns":
+                across = np.eye(3) - np.outer(target.direction, target.direction)
+                errors.append(across @ (p - target.point))
+                derivatives.append(across @ (twist[3:] - skew(p) @ twist[:3]))
+        motion, twist = motion @ refined.start, twist.copy()
+        for screw, turns in refined.screws:
+            axis = screw.transform(motion)
+            u, p = axis.direction, axis.point
+            twist[:, 6 + k] = np.concatenate((u, np.cross(p, u)) if turns else (np.zeros(3), u))
+            motion = motion @ screw_motion(screw, values[k], turns=turns)
+            k += 1
+        after.append((motion, twist))
     for frame in alignment.frames if with_links else ():
         if frame.tool is not IDENTITY:
             continue
-        _, motion, twist = after[frame.previous] if frame.previous >= 0 else root
+        motion, twist = after[frame.previous] if frame.previous >= 0 else root
         T = motion @ b.zero_poses[frame.b]
         errors.append(size * log_rotation(T[:3, :3] @ frame.zero_pose[:3, :3].T))
         errors.append(T[:3, 3] - frame.zero_pose[:3, 3])
         derivatives.append(size * twist[:3])
         derivatives.append(twist[3:] - skew(T[:3, 3]) @ twist[:3])
-    return np.concatenate(errors), np.concatenate(derivatives)
+    empty = np.zeros(0), np.zeros((0, 6 + n))
+    return (
+        np.concatenate([empty[0], *errors]),
+        np.concatenate([empty[1], *derivatives]),
+        [motion for motion, _ in after],
+    )
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:

@@ -165,6 +165,17 @@ class MechanismMatcher:
         assert best is not None
         return best
 
+    def full_matches(self) -> Iterator[Alignment]:
+        """Yield one alignment without unmatched joints for each set of joint pairs."""
+        seen, self.exact = list[dict[str, str]](), None
+        for bodies, X in self._start_candidates():
+            if not self.joint_matcher.has_same_shape(bodies, (None, None)):
+                continue
+            alignment = self._match_from(bodies, X)
+            if not (alignment.only_a or alignment.only_b) and alignment.names not in seen:
+                seen.append(alignment.names)
+                yield alignment
+
     def find_exact(self) -> Alignment | None:
         """Search an exact match from each body pair with links of equal labels."""
         start = None if self.exact is None else self._exact_start(self.exact, self._shared_bodies())
@@ -769,6 +780,8 @@ LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 MAX_REFINED_JOINTS = 100
 #: Maximum number of attempts to exchange the partners of two joint pairs.
 MAX_EXCHANGES = 12
+#: Maximum number of alignments without unmatched joints that are fitted.
+MAX_FULL_MATCHES = 12
 
 
 def align(
@@ -785,6 +798,7 @@ def align(
         named = _with_refined_axes(named, name_map)
         if named.is_complete and not named.has_separated_names:
             best = named
+    first = best
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.is_complete:
             break
@@ -795,9 +809,13 @@ def align(
             candidate = _best_alignment(a, other, name_map, None)
             if _is_better_alignment(candidate, best):
                 best = candidate
+    if best is not first and not best.matches_all_common_links:
+        # A new order of the joints omits links. The fit can make it unnecessary.
+        refined = _with_refined_axes(first, name_map)
+        best = refined if refined.is_complete else best
     best = _with_refined_axes(_with_exchanged_joints(best, name_map), name_map)
     best = _with_larger_tolerances(_with_another_start(best, b, name_map), name_map)
-    return _with_zeros_by_mimic_rules(best)
+    return _with_zeros_by_mimic_rules(_with_all_joints(best, b, name_map))
 
 
 def _orders_to_try(
@@ -874,6 +892,25 @@ def _with_another_start(best: Alignment, b: Mechanism, name_map: Mapping[str, st
     return exact if exact is not None and exact.matches_all_common_links else best
 
 
+def _with_all_joints(best: Alignment, b: Mechanism, name_map: Mapping[str, str]) -> Alignment:
+    """If joints of both models are unmatched, fit other alignments that match all joints.
+
+    Before a fit, a wrong alignment can have more coincident axes than the correct alignment.
+    """
+    if not (best.only_a and best.only_b):
+        return best
+    tolerance = tolerance_of(best.a, b)
+    joint_matcher = JointMatcher(best.a, b, name_map, tolerance)
+    matcher = MechanismMatcher(
+        best.a, b, joint_matcher, None, LookAhead(MAX_LOOK_AHEAD_PAIRS), tolerance, None
+    )
+    for alignment in islice(matcher.full_matches(), MAX_FULL_MATCHES):
+        refined = _with_refined_axes(alignment, name_map)
+        if refined.is_complete and refined.matches_all_common_links:
+            return refined
+    return best
+
+
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Align again with larger tolerances, because axes may all differ by more than the normal tolerance."""
     if best.all_joints_agree and best.has_free_frames:
@@ -908,13 +945,18 @@ def _with_refined_axes(best: Alignment, name_map: Mapping[str, str]) -> Alignmen
     if agrees or best.only_a or best.only_b or not 0 < len(best.steps) <= MAX_REFINED_JOINTS:
         return best
     for start in _starts_of_refinement(best, name_map):
-        if any(step.kind not in ("turns", "prismatic") or step.kind_difference for step in start.steps):
+        if any(step.kind_difference for step in start.steps):
             continue
-        for with_links in (False,) if best.has_free_frames else (True, False):
-            refined = refine_choices(start, with_links=with_links)
-            exact = _best_alignment(best.a, best.b, start.names, refined)
-            if exact.all_joints_agree and _is_better_alignment(exact, best):
-                return exact
+        # The links can lead the fit to a wrong solution.
+        # Then the last fit starts where all axes coincide.
+        tried = start
+        for with_links in (False,) if best.has_free_frames else (True, False, True):
+            if with_links and tried is not start and not tried.all_joints_agree:
+                break
+            refined = refine_choices(tried if with_links else start, with_links=with_links)
+            tried = _best_alignment(best.a, best.b, start.names, refined)
+            if tried.all_joints_agree and _is_better_alignment(tried, best):
+                return tried
     return best
 
 

@@ -97,7 +97,7 @@ def read_baseline(path: Path) -> Baseline:
             raise ValueError
         for entry in document["findings"]:
             counts[tuple(str(entry[name]) for name in _BASELINE_FIELDS)] = int(entry["count"])
-    except (ValueError, TypeError, LookupError, RecursionError):
+    except (ValueError, TypeError, LookupError, OverflowError, RecursionError):
         remedy = "write a baseline with: urdfkin check --write-baseline FILE ..."
         raise InputError("this file is not a baseline of urdfkin", where=str(path), remedy=remedy) from None
     return Baseline(counts, path.parent)
