@@ -72,7 +72,7 @@ def summarize(results: list[dict[str, Any]]) -> Iterator[str]:
     robots = len({result["robot"] for result in results})
     yield f"{len(results) - len(wrong)} of {len(results)} verdicts right, {robots} robots"
     held = len(bounded) - len(missed)
-    yield f"{held} of {len(bounded)} intervals contain the largest distance that the search found"
+    yield f"{held} of {len(bounded)} intervals of `same` contain the largest distance that a search found"
     for change in UNLIKE:
         upper_ratios = [
             result["upper"] / result["truth"]

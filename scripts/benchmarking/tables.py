@@ -116,7 +116,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
         yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # Sort the rows by quantity, then by contender. Groups keep the order of their first rows.
+            # Sort the rows by quantity, then by contender. Quantities and contenders keep their order.
             keys = [(row["quantity"], row["label"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["label"])))

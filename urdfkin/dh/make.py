@@ -32,7 +32,7 @@ _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
 def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
-    """Derive a table like `reference`; `options.flip` must be the result of `find_reversed_joints`."""
+    """Derive a table with the free choices of `reference`; `find_reversed_joints` returns `options.flip`."""
     standard = replace(options, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), options.convention)
 

@@ -270,8 +270,8 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # On a path from child to parent, a rotation to the joint's axis comes before the joint's motion.
-            # The joint's constant pose comes after the motion, and counts as one more pose.
+            # If the path leads from child to parent, the pose before the joint's motion aligns z with the
+            # joint's axis. The joint's constant pose comes after the motion, and counts as one more pose.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

@@ -57,10 +57,7 @@ class Origin:
 
     @property
     def source_argument(self) -> str:
-        """The argument of `load` for the source.
-
-        If the source has no name, the argument is `-` (standard input).
-        """
+        """The argument ROBOT of a command; `-` (standard input) for a source without a name."""
         return "-" if self.source.startswith("<") else self.source
 
     @property

@@ -42,9 +42,9 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 @dataclass(frozen=True, slots=True)
 class _TargetNumber:
-    """A number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
+    """An entry of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
 
-    If `cos_or_sin` is not empty, the number is the cosine or sine of this value.
+    If `cos_or_sin` is not empty, the entry is the cosine or sine of this value.
     """
 
     name: str
@@ -765,7 +765,7 @@ class Conversion:
             return converted
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
-        # J lacks the batch axes that only v has.
+        # v can have more batch axes than J.
         return converted + self.reorder_six_vector(J, -2) @ _add_frame_axis(change, converted.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:

@@ -364,8 +364,9 @@ _NEGLIGIBLE_CHANGE = 1e-14
 def refine_choices(alignment: Alignment, *, with_links: bool) -> AlignmentChoices:
     """Solve for B's root pose, all zero offsets and all conversions together.
 
-    With the solution, all axes of B coincide with axes of A. `MechanismMatcher` finds one zero offset after another. This fails if an axis depends on two unknown
-    offsets, or if nearly parallel axes magnify the rounding error of an offset.
+    With the solution, all axes of B coincide with axes of A. `MechanismMatcher` finds one zero offset after
+    another. This fails if an axis depends on two unknown offsets, or if nearly parallel axes magnify the
+    rounding error of an offset.
 
     Args:
         alignment: The joints of each pair have the same kind.

@@ -413,7 +413,7 @@ class _MimicChecker:
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if (joint.kind == "continuous") != (mimicked_joint.kind == "continuous"):
             name = "mimic" if joint.kind == "continuous" else "mimicked"
-            message = f"Pinocchio refuses the rule (mimic=True): only the {name} joint is continuous"
+            message = f"Pinocchio with mimic=True refuses this rule: only the {name} joint is continuous"
             remedy = f'write type="revolute" for the {name} joint'
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", remedy)
         if mimicked_joint.mimic is not None:
