@@ -486,6 +486,23 @@ def test_axes_through_one_point_are_distinguished_from_axes_in_one_plane() -> No
     assert explained(J).reasons[-1] == said
 
 
+def test_axes_that_are_parallel_in_every_configuration_do_not_explain_a_singularity() -> None:
+    z, y = "0 0 1", "0 1 0"
+    origins = ["0 0 0", "1 0 0", "1 0 0", "0.7 0 0", "0.3 0 0.2", "0.4 0 0.1", "0.1 0.3 0.2"]
+    axes_of_joints = [z, z, z, z, y, "1 0 0", y]
+    joints = [
+        joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", f'xyz="{origin}"', axis)
+        for i, (origin, axis) in enumerate(zip(origins, axes_of_joints, strict=True))
+    ]
+    tool = joint("tool", "fixed", "l7", "tip", 'xyz="0.1 0.2 0.3"')
+    robot = urdfs.built(*joints, tool)
+    # At this angle of j5, the columns of j4, j5 and j6 and of the parallel axes have rank 5.
+    one = found(robot, [0.3, 0.5, -0.7, 0.2, 0.4, 1.7273671480572632, 0.8])
+    assert (one.rank, len(one.lost_directions)) == (5, 1)
+    assert one.reasons[-1] == "2 independent joint motions of j0, j1, j2, j3, j4, j5 and j6 do not move tip."
+    assert not any(line.startswith("The axes of joints") for line in one.reasons)
+
+
 def test_dependent_columns_that_are_no_axes_have_no_geometric_explanation() -> None:
     J = np.random.default_rng(3).normal(size=(6, 6))
     J[:, 5] = J[:, 0] - 2.0 * J[:, 1]

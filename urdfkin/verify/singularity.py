@@ -6,8 +6,9 @@
 | null motion | right null vector of J, that is, joint velocities that do not move the frame |
 | minimal dependent set | linearly dependent columns that are independent if any column is removed |
 
-The joints of a minimal dependent set cause the loss of rank. The module states a geometric reason, such as
-parallel axes, only if the columns satisfy the condition within the error bound of J:
+The joints of a minimal dependent set cause the loss of rank. A set that is dependent in every configuration
+is not a cause. The module states a geometric reason, such as parallel axes, only if the columns satisfy the
+condition within the error bound of J:
 
     column of a revolute joint: [a x z; z]
     z: direction of the axis
@@ -192,6 +193,7 @@ class _SingularityExplainer:
         # samples have no base, so `_RANK_TOLERANCE` limits the noise.
         noise = min(self._bound_matrix_error(), _RANK_TOLERANCE)
         tolerances = np.maximum(noise, _RANK_TOLERANCE * norm(samples.reshape(len(samples), -1)))
+        self._samples, self._sample_tolerances = samples, tolerances
         generic_rank = int(np.linalg.matrix_rank(samples, tol=tolerances).max())
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return generic_rank, U[:, int((s > max(noise, _RANK_TOLERANCE * s[0])).sum()) :]
@@ -238,7 +240,12 @@ class _SingularityExplainer:
                 smallest_value = np.linalg.svd(A, compute_uv=False)[-1]
                 if smallest_value <= norm(A_error.ravel()) + self._bound_rounding_error(A):
                     found.append(set(columns))
-                    yield columns
+                    if not self._is_always_dependent(columns):
+                        yield columns
+
+    def _is_always_dependent(self, columns: tuple[int, ...]) -> bool:
+        ranks = np.linalg.matrix_rank(self._samples[:, :, columns], tol=self._sample_tolerances)
+        return int(ranks.max()) < len(columns)
 
     def _merge_overlapping_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         joined: list[set[int]] = []
