@@ -72,6 +72,25 @@ def test_singular_values_at_fifty_digits_lie_within_the_bounds(name: str, frame:
         assert found.values.value.size == min(len(J), len(moving))
 
 
+@pytest.mark.parametrize(
+    ("origin", "rule"),
+    [
+        ('xyz="1 0 0" rpy="0.1 0.2 123456789.1"', ""),
+        ('xyz="1 0 0"', '<mimic joint="j0" multiplier="0.001" offset="1000000.1"/>'),
+    ],
+)
+def test_bounds_of_singular_values_include_the_rounding_of_the_decimals(origin: str, rule: str) -> None:
+    robot = urdfs.built(
+        joint("j0", "continuous", "base", "l0"),
+        joint("j1", "continuous", "l0", "l1", origin, more=rule),
+        joint("j2", "continuous", "l1", "l2", 'xyz="1 0 0"'),
+        joint("j3", "prismatic", "l2", "tip", 'xyz="1 0 0"', "1 0.3 0", limit(-1.0, 1.0)),
+    )
+    q = np.linspace(0.7, 0.1, robot.nv)
+    J = true_jacobian(robot, q, "tip")
+    assert holds(robot.singular_values(q, "tip").values, true_values(J)[: robot.nv])
+
+
 def test_singular_values_of_a_jacobian_wrong_by_a_billionth_lie_outside_the_bounds() -> None:
     robot, q = urdfkin.load("ur5"), np.linspace(0.2, 1.7, 6)
     J, still = robot.jacobian(q, "tool0"), np.zeros((6, 6))
