@@ -1085,9 +1085,9 @@ class Robot(Displayable):
         """Return singular values, condition number and manipulability of `jacobian`, with guaranteed bounds.
 
         The bounds include the rounding errors of J and of the decomposition. Columns of J that are 0 for
-        every q are left out. LOCAL and LOCAL_WORLD_ALIGNED have the same singular values. `rows="all"` mixes
-        linear rows (metres) and angular rows (radians), so the values depend on the unit of length. `print`
-        shows the result as a table. Methods of the result:
+        every q are left out; docs/hessian.md lists two exceptions. LOCAL and LOCAL_WORLD_ALIGNED have the
+        same singular values. `rows="all"` mixes linear rows (metres) and angular rows (radians), so the
+        values depend on the unit of length. `print` shows the result as a table. Methods of the result:
 
         - `singularity()`: the lost directions, and the joints that cause the singularity
         - `manipulability_gradient(robot.hessian(q, frame))`: the gradient of the manipulability
