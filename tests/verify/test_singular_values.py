@@ -522,6 +522,19 @@ def test_axes_that_are_parallel_in_every_configuration_do_not_explain_a_singular
     assert not any(line.startswith("The axes of joints") for line in one.reasons)
 
 
+@pytest.mark.parametrize("size", [1.0, 1e6, 1e7])
+def test_axes_with_different_directions_are_never_called_parallel(size: float) -> None:
+    lengths = [0.0, 0.0, 0.0, size, 0.5 * size, 0.3 * size]
+    directions = ["0 0 1", "0.8 0 0.6", "-0.6 0 0.8", "0 1 0", "1 0 0", "0 1 1"]
+    joints = [
+        joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", f'xyz="{length} {0.3 * length} 0"', axis)
+        for i, (length, axis) in enumerate(zip(lengths, directions, strict=True))
+    ]
+    robot = urdfs.built(*joints, joint("tool", "fixed", "l6", "tip", f'xyz="{size} 0 {0.2 * size}"'))
+    one = found(robot, [0.3, 0.0, 0.8, 0.5, 0.2, 0.3])
+    assert one.reasons[-1] == "The axes of joints j0, j1 and j2 intersect in one point and lie in one plane."
+
+
 def test_dependent_columns_that_are_no_axes_have_no_geometric_explanation() -> None:
     J = np.random.default_rng(3).normal(size=(6, 6))
     J[:, 5] = J[:, 0] - 2.0 * J[:, 1]

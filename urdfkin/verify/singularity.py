@@ -299,13 +299,12 @@ class _SingularityExplainer:
     def _describe_revolute_axes(self, columns: tuple[int, ...]) -> str | None:
         indices = self._moving[list(columns)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
-        size = 1.0 + float(np.abs(v).max())
-        tolerance = 2.0 * float(norm(self._error[:, indices].ravel())) * size
-        tolerance += self._bound_rounding_error(self._J[:, indices]) * size
-        are_parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= tolerance).all())
+        error = self._bound_column_error(indices, slice(0, 6))
+        axis_error = self._bound_column_error(indices, slice(3, 6))
+        are_parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= axis_error).all())
         axes = f"The axes of {self._name_joints(columns)}"
         signs = np.sign(z @ z[0])[:, None]
-        if are_parallel and np.abs(v - signs * v[0]).max() <= tolerance:
+        if are_parallel and np.abs(v - signs * v[0]).max() <= error:
             return f"{axes} are collinear."
         # Three dependent lines that are parallel or concurrent are always coplanar, but four need not be
         # coplanar.
@@ -314,6 +313,7 @@ class _SingularityExplainer:
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
+        tolerance = error * (1.0 + float(np.abs(v).max()))
         if np.abs(crosses @ a - v.ravel()).max() > tolerance * float(np.linalg.cond(crosses)):
             return None
         return f"{axes} intersect in one point{' and lie in one plane' if len(columns) == 3 else ''}."
@@ -346,6 +346,11 @@ class _SingularityExplainer:
     def _name_joints(self, columns: Sequence[int]) -> str:
         names = _join_names([self._names[i] for i in columns])
         return f"{'joint' if len(columns) == 1 else 'joints'} {names}"
+
+    def _bound_column_error(self, indices: NDArray[np.intp], rows: slice) -> float:
+        """Bound the error of a difference of two columns."""
+        error = 2.0 * float(norm(self._error[rows, indices].ravel()))
+        return error + self._bound_rounding_error(self._J[rows, indices])
 
     def _bound_matrix_error(self) -> float:
         return float(norm(self._A_error.ravel())) + self._bound_rounding_error(self._A)
