@@ -535,6 +535,15 @@ def test_axes_with_different_directions_are_never_called_parallel(size: float) -
     assert one.reasons[-1] == "The axes of joints j0, j1 and j2 intersect in one point and lie in one plane."
 
 
+def test_slides_that_become_parallel_explain_a_singularity() -> None:
+    robot = urdfs.built(
+        joint("x", "prismatic", "base", "l0", axis="1 0 0", more=limit()),
+        joint("turn", "continuous", "l0", "l1"),
+        joint("slide", "prismatic", "l1", "tip", axis="1 0 0", more=limit()),
+    )
+    assert found(robot, [0.0, 0.0, 0.3]).reasons[-1] == "The joints x and slide slide along parallel axes."
+
+
 def test_dependent_columns_that_are_no_axes_have_no_geometric_explanation() -> None:
     J = np.random.default_rng(3).normal(size=(6, 6))
     J[:, 5] = J[:, 0] - 2.0 * J[:, 1]

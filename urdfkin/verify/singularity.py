@@ -278,7 +278,7 @@ class _SingularityExplainer:
             elif (
                 not any(is_revolute) and np.linalg.matrix_rank(self._A[:, columns], tol=_RANK_TOLERANCE) == 1
             ):
-                reason = f"{self._name_joints(columns)} slide along parallel axes."
+                reason = f"The {self._name_joints(columns)} slide along parallel axes."
         if reason is not None:
             return reason
         _, _, Vt = np.linalg.svd(self._A[:, columns])
@@ -293,7 +293,7 @@ class _SingularityExplainer:
         if len(columns) == 2 and all(is_revolute):
             return f"The axes of {self._name_joints(columns)} lie in one plane with the origin of {frame}."
         if len(columns) == 3:
-            return f"{self._name_joints(columns)} move the origin of {frame} in one plane only."
+            return f"The {self._name_joints(columns)} move the origin of {frame} in one plane only."
         return None
 
     def _describe_revolute_axes(self, columns: tuple[int, ...]) -> str | None:
