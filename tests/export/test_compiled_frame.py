@@ -50,6 +50,13 @@ def test_compiled_results_agree_with_pinocchio_and_are_equal_in_single_calls_and
     assert all(line.unchecked == 3 * 37 for line in certificate.lines)
 
 
+@needs_compiler
+def test_the_certificate_counts_only_the_returned_results_of_an_unverified_compiled_frame() -> None:
+    robot = urdfkin.load("planar_two_link", verify=False)
+    robot.compile("tip").placement(np.zeros((5, 2)))
+    assert [(line.checked, line.unchecked) for line in robot.certificate().lines] == [(0, 5)]
+
+
 @pytest.fixture(scope="module")
 def arm() -> Robot:
     return urdfkin.load("planar_two_link", verify=False)

@@ -18,6 +18,7 @@ from urdfkin.errors import InputError
 from urdfkin.robot import Robot
 from urdfkin.verify.certificate import CHECK_DISABLED, Certificate
 from urdfkin.verify.comparison import BatchComparison
+from urdfkin.verify.pinocchio import PinocchioOracle
 
 FRAME = "panda_hand"
 
@@ -82,6 +83,24 @@ def test_the_certificate_does_not_count_refused_calls(robot: Robot) -> None:
             compute()
     assert robot.certificate().lines == ()
     assert robot.certificate().not_verified == ()
+
+
+@pytest.mark.parametrize("prepared", [False, True])
+def test_a_certificate_is_not_verified_after_a_disagreement(
+    prepared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = urdfkin.load("planar_two_link")
+    q = np.array([0.3, 0.4])
+    robot.jacobian(q, "tip")
+    compute = robot.prepare("tip", verify=True).placement if prepared else robot.placement
+    right = PinocchioOracle.placements
+    monkeypatch.setattr(PinocchioOracle, "placements", lambda *x: right(*x) + 1e-9)
+    with pytest.raises(urdfkin.VerificationError):
+        compute(q)
+    certificate = robot.certificate()
+    assert counts(robot) == {"placement": (0, 0), "jacobian": (1, 0)}
+    assert certificate.lines[0].bound_ratio > 1.0
+    assert not certificate.verified
 
 
 def test_unchecked_calls_of_a_prepared_frame_and_checked_calls_have_one_certificate(robot: Robot) -> None:

@@ -72,6 +72,25 @@ def test_singular_values_at_fifty_digits_lie_within_the_bounds(name: str, frame:
         assert found.values.value.size == min(len(J), len(moving))
 
 
+@pytest.mark.parametrize(
+    ("origin", "rule"),
+    [
+        ('xyz="1 0 0" rpy="0.1 0.2 123456789.1"', ""),
+        ('xyz="1 0 0"', '<mimic joint="j0" multiplier="0.001" offset="1000000.1"/>'),
+    ],
+)
+def test_bounds_of_singular_values_include_the_rounding_of_the_decimals(origin: str, rule: str) -> None:
+    robot = urdfs.built(
+        joint("j0", "continuous", "base", "l0"),
+        joint("j1", "continuous", "l0", "l1", origin, more=rule),
+        joint("j2", "continuous", "l1", "l2", 'xyz="1 0 0"'),
+        joint("j3", "prismatic", "l2", "tip", 'xyz="1 0 0"', "1 0.3 0", limit(-1.0, 1.0)),
+    )
+    q = np.linspace(0.7, 0.1, robot.nv)
+    J = true_jacobian(robot, q, "tip")
+    assert holds(robot.singular_values(q, "tip").values, true_values(J)[: robot.nv])
+
+
 def test_singular_values_of_a_jacobian_wrong_by_a_billionth_lie_outside_the_bounds() -> None:
     robot, q = urdfkin.load("ur5"), np.linspace(0.2, 1.7, 6)
     J, still = robot.jacobian(q, "tool0"), np.zeros((6, 6))
@@ -484,6 +503,45 @@ def test_axes_through_one_point_are_distinguished_from_axes_in_one_plane() -> No
     J[:, 3] = axes(rng.normal(size=(1, 3)), rng.normal(size=(1, 3)))[:, 0]
     said = "The axes of joints j0, j1 and j2 intersect in one point and lie in one plane."
     assert explained(J).reasons[-1] == said
+
+
+def test_axes_that_are_parallel_in_every_configuration_do_not_explain_a_singularity() -> None:
+    z, y = "0 0 1", "0 1 0"
+    origins = ["0 0 0", "1 0 0", "1 0 0", "0.7 0 0", "0.3 0 0.2", "0.4 0 0.1", "0.1 0.3 0.2"]
+    axes_of_joints = [z, z, z, z, y, "1 0 0", y]
+    joints = [
+        joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", f'xyz="{origin}"', axis)
+        for i, (origin, axis) in enumerate(zip(origins, axes_of_joints, strict=True))
+    ]
+    tool = joint("tool", "fixed", "l7", "tip", 'xyz="0.1 0.2 0.3"')
+    robot = urdfs.built(*joints, tool)
+    # At this angle of j5, the columns of j4, j5 and j6 and of the parallel axes have rank 5.
+    one = found(robot, [0.3, 0.5, -0.7, 0.2, 0.4, 1.7273671480572632, 0.8])
+    assert (one.rank, len(one.lost_directions)) == (5, 1)
+    assert one.reasons[-1] == "2 independent joint motions of j0, j1, j2, j3, j4, j5 and j6 do not move tip."
+    assert not any(line.startswith("The axes of joints") for line in one.reasons)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e6, 1e7])
+def test_axes_with_different_directions_are_never_called_parallel(size: float) -> None:
+    lengths = [0.0, 0.0, 0.0, size, 0.5 * size, 0.3 * size]
+    directions = ["0 0 1", "0.8 0 0.6", "-0.6 0 0.8", "0 1 0", "1 0 0", "0 1 1"]
+    joints = [
+        joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", f'xyz="{length} {0.3 * length} 0"', axis)
+        for i, (length, axis) in enumerate(zip(lengths, directions, strict=True))
+    ]
+    robot = urdfs.built(*joints, joint("tool", "fixed", "l6", "tip", f'xyz="{size} 0 {0.2 * size}"'))
+    one = found(robot, [0.3, 0.0, 0.8, 0.5, 0.2, 0.3])
+    assert one.reasons[-1] == "The axes of joints j0, j1 and j2 intersect in one point and lie in one plane."
+
+
+def test_slides_that_become_parallel_explain_a_singularity() -> None:
+    robot = urdfs.built(
+        joint("x", "prismatic", "base", "l0", axis="1 0 0", more=limit()),
+        joint("turn", "continuous", "l0", "l1"),
+        joint("slide", "prismatic", "l1", "tip", axis="1 0 0", more=limit()),
+    )
+    assert found(robot, [0.0, 0.0, 0.3]).reasons[-1] == "The joints x and slide slide along parallel axes."
 
 
 def test_dependent_columns_that_are_no_axes_have_no_geometric_explanation() -> None:

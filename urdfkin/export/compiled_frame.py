@@ -380,12 +380,14 @@ class CompiledFrame:
         except NoCompilerError:
             return None
         task.argtypes, task.restype = [ctypes.c_void_p], ctypes.c_int64
+        if verifier.policy is False:
+            return task
         samples = draw_samples(
             verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_zero_and_limits=True
         )
         call = self._make_call((samples.q, samples.v, samples.a)[: len(row.inputs)])
         result = call.restore_shape(self._run_call(task, row, call, None, 1))
-        verifier.check(row, call, result, verifier.resolve_policy(None))
+        verifier.check(row, call, result, True)
         return task
 
     def _make_call(self, inputs: Sequence[ConfigurationLike]) -> Call:

@@ -50,7 +50,7 @@ from urdfkin.system.lazy_import import get_hook
 from urdfkin.system.locks import import_lock
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, find_entry
-from urdfkin.verify.bounds import compute_magnitudes, find_active_entries, singularity_margin
+from urdfkin.verify.bounds import find_active_entries, singularity_margin, true_value_magnitudes
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracles import OracleName
@@ -1085,9 +1085,9 @@ class Robot(Displayable):
         """Return singular values, condition number and manipulability of `jacobian`, with guaranteed bounds.
 
         The bounds include the rounding errors of J and of the decomposition. Columns of J that are 0 for
-        every q are left out. LOCAL and LOCAL_WORLD_ALIGNED have the same singular values. `rows="all"` mixes
-        linear rows (metres) and angular rows (radians), so the values depend on the unit of length. `print`
-        shows the result as a table. Methods of the result:
+        every q are left out; docs/hessian.md lists two exceptions. LOCAL and LOCAL_WORLD_ALIGNED have the
+        same singular values. `rows="all"` mixes linear rows (metres) and angular rows (radians), so the
+        values depend on the unit of length. `print` shows the result as a table. Methods of the result:
 
         - `singularity()`: the lost directions, and the joints that cause the singularity
         - `manipulability_gradient(robot.hessian(q, frame))`: the gradient of the manipulability
@@ -1113,7 +1113,11 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         J = self.jacobian(q, as_str(frame, "frame"), base=base, verify=verify, threads=threads)
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
-        size = compute_magnitudes(call.plan, call.q, None, None, call.state)
+        with import_lock:
+            from urdfkin.verify.exact.numbers import conversion_errors
+
+        decimals = conversion_errors(self.urdf, self.tree, self.tree.path(call.links[0]), call.q)
+        size = true_value_magnitudes(call.plan, call.q, None, None, decimals, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
         active = find_active_entries(call.plan)[0]

@@ -358,7 +358,12 @@ class DecimalErrors(NamedTuple):
 
 
 def true_value_magnitudes(
-    plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
+    plan: CompiledTree,
+    q: FloatArray,
+    v: FloatArray | None,
+    a: FloatArray | None,
+    errors: DecimalErrors,
+    base: FloatArray = FIXED_BASE_STATE,
 ) -> Magnitudes:
     """Return `Magnitudes` for a comparison with true values.
 
@@ -404,9 +409,7 @@ def true_value_magnitudes(
     | allowed relative error | 1.5 eps for each rule |
     | roundings of the joint velocity and acceleration | fewer than of the displacement |
     """
-    magnitudes = compute_magnitudes(
-        replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE
-    )
+    magnitudes = compute_magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, base)
     additional = errors.angles[:, np.newaxis] + 1.5 * errors.rule_count
     return replace(magnitudes, roundings=magnitudes.roundings + additional)
 

@@ -83,7 +83,7 @@ class CertificateLine:
     Attributes:
         checked: Number of results that the oracle confirmed.
         worst: Largest difference, in multiples of eps * scale.
-        bound_ratio: Largest ratio of a difference to its bound.
+        bound_ratio: Largest ratio of a difference to its bound; above 1 after a `VerificationError`.
         unchecked: Number of results without a check.
     """
 
@@ -322,9 +322,8 @@ class Ledger:
             has_disabled_checks = any(account.count_disabled_checks() for account in accounts.values())
             reasons = (*([CHECK_DISABLED] if has_disabled_checks else []), *self._reasons)
             lines = [account.line(name) for name, account in accounts.items()]
-            return Certificate(
-                robot, oracle, tuple(line for line in lines if line.checked or line.unchecked), reasons
-            )
+            known = (x for x in lines if x.checked or x.unchecked or not x.bound_ratio <= 1.0)
+            return Certificate(robot, oracle, tuple(known), reasons)
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
         # The counts of a copy begin at 0, because the copy may be used in another process.

@@ -54,8 +54,9 @@ class BoundedArray(NamedTuple):
 class SingularValues(Displayable):
     """Singular values of some rows of a Jacobian.
 
-    The decomposition omits columns that are 0 in every configuration. `print` and notebooks display a table.
-    For a single configuration, the text of `singularity()` follows the table.
+    The decomposition omits columns that are 0 in every configuration; docs/hessian.md lists two
+    exceptions. `print` and notebooks display a table. For a single configuration, the text of `singularity()`
+    follows the table.
 
     Attributes:
         rows: The chosen rows of the Jacobian, as a slice.

@@ -6,8 +6,9 @@
 | null motion | right null vector of J, that is, joint velocities that do not move the frame |
 | minimal dependent set | linearly dependent columns that are independent if any column is removed |
 
-The joints of a minimal dependent set cause the loss of rank. The module states a geometric reason, such as
-parallel axes, only if the columns satisfy the condition within the error bound of J:
+The joints of a minimal dependent set cause the loss of rank. A set that is dependent in every configuration
+is not a cause. The module states a geometric reason, such as parallel axes, only if the columns satisfy the
+condition within the error bound of J:
 
     column of a revolute joint: [a x z; z]
     z: direction of the axis
@@ -192,6 +193,7 @@ class _SingularityExplainer:
         # samples have no base, so `_RANK_TOLERANCE` limits the noise.
         noise = min(self._bound_matrix_error(), _RANK_TOLERANCE)
         tolerances = np.maximum(noise, _RANK_TOLERANCE * norm(samples.reshape(len(samples), -1)))
+        self._samples, self._sample_tolerances = samples, tolerances
         generic_rank = int(np.linalg.matrix_rank(samples, tol=tolerances).max())
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return generic_rank, U[:, int((s > max(noise, _RANK_TOLERANCE * s[0])).sum()) :]
@@ -238,7 +240,12 @@ class _SingularityExplainer:
                 smallest_value = np.linalg.svd(A, compute_uv=False)[-1]
                 if smallest_value <= norm(A_error.ravel()) + self._bound_rounding_error(A):
                     found.append(set(columns))
-                    yield columns
+                    if not self._is_always_dependent(columns):
+                        yield columns
+
+    def _is_always_dependent(self, columns: tuple[int, ...]) -> bool:
+        ranks = np.linalg.matrix_rank(self._samples[:, :, columns], tol=self._sample_tolerances)
+        return int(ranks.max()) < len(columns)
 
     def _merge_overlapping_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         joined: list[set[int]] = []
@@ -271,7 +278,7 @@ class _SingularityExplainer:
             elif (
                 not any(is_revolute) and np.linalg.matrix_rank(self._A[:, columns], tol=_RANK_TOLERANCE) == 1
             ):
-                reason = f"{self._name_joints(columns)} slide along parallel axes."
+                reason = f"The {self._name_joints(columns)} slide along parallel axes."
         if reason is not None:
             return reason
         _, _, Vt = np.linalg.svd(self._A[:, columns])
@@ -286,19 +293,18 @@ class _SingularityExplainer:
         if len(columns) == 2 and all(is_revolute):
             return f"The axes of {self._name_joints(columns)} lie in one plane with the origin of {frame}."
         if len(columns) == 3:
-            return f"{self._name_joints(columns)} move the origin of {frame} in one plane only."
+            return f"The {self._name_joints(columns)} move the origin of {frame} in one plane only."
         return None
 
     def _describe_revolute_axes(self, columns: tuple[int, ...]) -> str | None:
         indices = self._moving[list(columns)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
-        size = 1.0 + float(np.abs(v).max())
-        tolerance = 2.0 * float(norm(self._error[:, indices].ravel())) * size
-        tolerance += self._bound_rounding_error(self._J[:, indices]) * size
-        are_parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= tolerance).all())
+        error = self._bound_column_error(indices, slice(0, 6))
+        axis_error = self._bound_column_error(indices, slice(3, 6))
+        are_parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= axis_error).all())
         axes = f"The axes of {self._name_joints(columns)}"
         signs = np.sign(z @ z[0])[:, None]
-        if are_parallel and np.abs(v - signs * v[0]).max() <= tolerance:
+        if are_parallel and np.abs(v - signs * v[0]).max() <= error:
             return f"{axes} are collinear."
         # Three dependent lines that are parallel or concurrent are always coplanar, but four need not be
         # coplanar.
@@ -307,6 +313,7 @@ class _SingularityExplainer:
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
+        tolerance = error * (1.0 + float(np.abs(v).max()))
         if np.abs(crosses @ a - v.ravel()).max() > tolerance * float(np.linalg.cond(crosses)):
             return None
         return f"{axes} intersect in one point{' and lie in one plane' if len(columns) == 3 else ''}."
@@ -339,6 +346,11 @@ class _SingularityExplainer:
     def _name_joints(self, columns: Sequence[int]) -> str:
         names = _join_names([self._names[i] for i in columns])
         return f"{'joint' if len(columns) == 1 else 'joints'} {names}"
+
+    def _bound_column_error(self, indices: NDArray[np.intp], rows: slice) -> float:
+        """Bound the error of a difference of two columns."""
+        error = 2.0 * float(norm(self._error[rows, indices].ravel()))
+        return error + self._bound_rounding_error(self._J[rows, indices])
 
     def _bound_matrix_error(self) -> float:
         return float(norm(self._A_error.ravel())) + self._bound_rounding_error(self._A)

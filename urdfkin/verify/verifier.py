@@ -215,6 +215,8 @@ class Verifier:
                 worst = failure
             total += comparison
         if worst is not None:
+            # The failed call returns no results, but the certificate must show the disagreement.
+            ledger.count_checked(quantity.name, replace(total, result_count=0))
             raise worst
         ledger.count_checked(quantity.name, total)
         if unchecked := call.result_count - total.result_count:
