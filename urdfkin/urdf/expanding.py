@@ -57,6 +57,7 @@ def _expand(
     importlib.import_module("xml.dom.expatbuilder")  # After `confine`, xacro cannot import this module.
     confine(allowed_paths.allows)
     # `XacroDoc.from_file` expands the result again, and so evaluates the text that `$${...}` protects.
+    xacro.init_stacks(str(path))  # `xacro.abs_filename` needs the file's folder.
     document = xacro.parse(path.read_text())
     xacro.process_doc(document, mappings=arguments)
     urdf = xacrodoc.XacroDoc(document, rootdir=path.parent).to_urdf_string()
