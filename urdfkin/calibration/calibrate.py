@@ -408,22 +408,16 @@ def _fit(
     *,
     write_all: bool,
 ) -> tuple[FitWithData, Calibration]:
-    stated, start = None if noise is None else _parse_noise(noise), estimate_start_values(model, measurements)
-    identification = identify(
-        model, measurements.joint_values, full_poses=measurements.full_poses, parameter_values=start
-    )
-    ends = [k for k in identification.free_parameters if model.chain.parameters[k].is_base_or_tool]
-    before = fit_parameters(model, measurements, ends, stated, start)
-    full_fit = fit_parameters(
-        model, measurements, identification.free_parameters, stated, before.parameter_values
-    )
-    identification, full_fit = _add_identifiable(model, measurements, identification, stated, full_fit)
+    stated = None if noise is None else _parse_noise(noise)
+    identification, before, full_fit = _fit_identifiable(model, measurements, stated)
     odd, clean = reject_outliers(model, measurements, identification.free_parameters, stated, full_fit)
     if drop_outliers and odd:
         chosen = np.ones(len(measurements), dtype=bool)
         chosen[list(odd)] = False
-        q, measurements, full_fit = q[chosen], measurements.select(chosen), clean
-        before = fit_parameters(model, measurements, ends, stated, before.parameter_values)
+        q, measurements = q[chosen], measurements.select(chosen)
+        # An outlier can make parameters seem identifiable that the other poses do not identify.
+        identification, before, full_fit = _fit_identifiable(model, measurements, stated)
+        clean = full_fit
     fit = FitWithData(model, q, measurements, identification, before, full_fit)
     chosen_parameters, written = identification.free_parameters, full_fit
     if not write_all:
@@ -444,6 +438,23 @@ def _fit(
         written_fit=written,
         selected_parameters=chosen_parameters,
     )
+
+
+def _fit_identifiable(
+    model: CalibrationModel, measurements: Measurements, stated: Noise | None
+) -> tuple[Identification, Fit, Fit]:
+    """Return the identifiable parameters, a fit of base and tool alone, and a fit of all these parameters."""
+    start = estimate_start_values(model, measurements)
+    identification = identify(
+        model, measurements.joint_values, full_poses=measurements.full_poses, parameter_values=start
+    )
+    ends = [k for k in identification.free_parameters if model.chain.parameters[k].is_base_or_tool]
+    before = fit_parameters(model, measurements, ends, stated, start)
+    full_fit = fit_parameters(
+        model, measurements, identification.free_parameters, stated, before.parameter_values
+    )
+    identification, full_fit = _add_identifiable(model, measurements, identification, stated, full_fit)
+    return identification, before, full_fit
 
 
 def _refit_significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
