@@ -333,6 +333,16 @@ def test_each_fixed_parameter_states_the_parameter_with_the_same_effect() -> Non
     assert reasons["wrist_3_link-tool0_fixed_joint rx"] == "no effect on the measured numbers"
 
 
+@pytest.mark.slow
+def test_random_poses_with_a_target_on_the_last_axis_do_not_lack_variety() -> None:
+    robot = load("ur5")
+    q = robot.sample(60, seed=0)
+    p = robot.placement(q, "tool0")[:, :3, 3] + 1e-4 * np.random.default_rng(0).standard_normal((60, 3))
+    found = calibrate(robot, q, p, tip="tool0")
+    assert found.identification.rank == found.general_identification.rank == 25
+    assert list_warnings(found) == []
+
+
 def test_a_joint_without_motion_in_the_poses_is_reported() -> None:
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40)
     q = arm.q.copy()

@@ -94,7 +94,8 @@ class Calibration:
         model: The model with the parameters to fit.
         identification: The parameters that are identifiable from the measured poses. Without poses, the same
             as `general_identification`.
-        general_identification: The parameters that are identifiable from random poses.
+        general_identification: The parameters that are identifiable from random poses. Parameters that only
+            noise makes identifiable are not included.
         full_fit: The fit; None without poses.
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
@@ -354,9 +355,13 @@ def fit_model(
         q = np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
     path_q, measurements = _check_measured(robot, model, q, poses)
     data, calibration = _fit(robot, model, path_q, measurements, noise, drop_outliers, write_all=write_all)
-    identifiable = identify(
-        model, general, full_poses=measurements.full_poses, parameter_values=data.full_fit.parameter_values
-    )
+    # At the fitted values, noise can make more parameters identifiable, for example a tip beside an axis.
+    for fitted in (data.base_tool_fit, data.full_fit):
+        identifiable = identify(
+            model, general, full_poses=measurements.full_poses, parameter_values=fitted.parameter_values
+        )
+        if identifiable.rank >= data.identification.rank:
+            break
     calibration = replace(calibration, general_identification=identifiable)
     if check:
         calibration = replace(calibration, plausibility=check_plausibility(data, radians=radians))
