@@ -305,6 +305,8 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
         ("kinematics: {shoulder: {y: 0}}", "shoulder x: this is not a finite number: found NoneType"),
         (BOMB, "shoulder x: this is not a finite number: found list"),
+        ("kinematics: {shoulder: {x: 1, x: 2}}", "x.yaml:1: the calibration file contains a key twice"),
+        ("kinematics:\n  a: {}\n  a: {}", "x.yaml:3: the calibration file contains a key twice"),
         ("kinematics: " + "[" * 5000, "this is not a YAML file"),
     ],
 )
