@@ -140,6 +140,9 @@ def test_wrong_arrays_of_poses_are_reported(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
     with pytest.raises(InputError, match=r"\(q, T\), \(q, p\) or \(q, p, quat\): found q, T, p"):
         read_poses(tmp_path / "x.npz", NAMES, NAMES)
+    np.savez(tmp_path / "x.npz", q=Q, T=T, names=NAMES)
+    with pytest.raises(InputError, match="unknown arrays or lacks an array: found unknown: names"):
+        read_poses(tmp_path / "x.npz", NAMES, NAMES)
 
 
 def test_the_csv_output_of_placement_is_read_as_measured_poses(tmp_path: Path) -> None:
