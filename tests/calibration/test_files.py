@@ -140,6 +140,9 @@ def test_wrong_arrays_of_poses_are_reported(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
     with pytest.raises(InputError, match=r"\(q, T\), \(q, p\) or \(q, p, quat\): found q, T, p"):
         read_poses(tmp_path / "x.npz", NAMES, NAMES)
+    np.savez(tmp_path / "x.npz", q=Q, T=T, names=NAMES)
+    with pytest.raises(InputError, match="unknown arrays or lacks an array: found unknown: names"):
+        read_poses(tmp_path / "x.npz", NAMES, NAMES)
 
 
 def test_the_csv_output_of_placement_is_read_as_measured_poses(tmp_path: Path) -> None:
@@ -305,6 +308,8 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
         ("kinematics: {shoulder: {x: .nan}}", "shoulder x"),
         ("kinematics: {shoulder: {y: 0}}", "shoulder x: this is not a finite number: found NoneType"),
         (BOMB, "shoulder x: this is not a finite number: found list"),
+        ("kinematics: {shoulder: {x: 1, x: 2}}", "x.yaml:1: the calibration file contains a key twice"),
+        ("kinematics:\n  a: {}\n  a: {}", "x.yaml:3: the calibration file contains a key twice"),
         ("kinematics: " + "[" * 5000, "this is not a YAML file"),
     ],
 )

@@ -174,6 +174,22 @@ def test_outliers_are_reported_and_excluded_only_on_request() -> None:
     assert list_warnings(clean) == ["poses 17, 40 are excluded as outliers"]
 
 
+@pytest.mark.slow
+def test_excluding_an_outlier_gives_the_same_fit_as_data_without_this_pose() -> None:
+    robot = load("ur5")
+    q = robot.sample(30, seed=15)
+    p = robot.placement(q, "tool0")[:, :3, 3] + 1e-4 * np.random.default_rng(5).standard_normal((30, 3))
+    p[7, 0] += 0.01
+    options = {"tip": "tool0", "noise": (1e-4, 1e-4), "write_all": True}
+    found = calibrate(robot, q, p, drop_outliers=True, **options)
+    assert found.outliers == (7,)
+    others = np.arange(30) != 7
+    expected = calibrate(robot, q[others], p[others], **options)
+    # With the outlier, 27 parameters seem identifiable.
+    assert found.identification.rank == expected.identification.rank == 25
+    np.testing.assert_array_equal(found.changes, expected.changes)
+
+
 def test_a_path_without_parameters_is_refused() -> None:
     robot = load("ur5")
     base = robot.base_frame
@@ -315,6 +331,16 @@ def test_each_fixed_parameter_states_the_parameter_with_the_same_effect() -> Non
     assert reasons["shoulder_pan_joint rz"] == "same effect as base rz"
     assert reasons["elbow_joint z"] == "same effect as shoulder_lift_joint z"
     assert reasons["wrist_3_link-tool0_fixed_joint rx"] == "no effect on the measured numbers"
+
+
+@pytest.mark.slow
+def test_random_poses_with_a_target_on_the_last_axis_do_not_lack_variety() -> None:
+    robot = load("ur5")
+    q = robot.sample(60, seed=0)
+    p = robot.placement(q, "tool0")[:, :3, 3] + 1e-4 * np.random.default_rng(0).standard_normal((60, 3))
+    found = calibrate(robot, q, p, tip="tool0")
+    assert found.identification.rank == found.general_identification.rank == 25
+    assert list_warnings(found) == []
 
 
 def test_a_joint_without_motion_in_the_poses_is_reported() -> None:

@@ -79,7 +79,7 @@ SINGLE_ARRAY = (
         ({"q": np.array(0.0)}, "q must have the shape (n, 6)"),
         (
             {"Q": np.zeros((4, 6))},
-            "log.npz: the arrays in the file are not those of a trajectory: found unknown: Q",
+            "log.npz: the file has unknown arrays or lacks an array: found unknown: Q",
         ),
         ({"q": np.zeros((4, 6)), "base_velocity": np.zeros((4, 6))}, "must be given together"),
         ({"q": np.array([print], dtype=object)}, "not an .npz file of numbers"),

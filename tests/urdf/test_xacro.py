@@ -58,6 +58,23 @@ def test_a_xacro_file_is_loaded_with_its_arguments(arm: Path) -> None:
         assert robot.certificate().verified
 
 
+def test_an_escaped_expression_stays_text(write: Write) -> None:
+    """The program xacro replaces `$${` by `${` and evaluates nothing in the result."""
+    path = write(f'<robot name="$${{1 + 1}} $$(arg n) ${{1 + 1}}" {NAMESPACE}/>', "escaped.xacro")
+    assert b'name="${1 + 1} $(arg n) 2"' in expand(path, {})
+
+
+def test_abs_filename_returns_an_absolute_path_in_the_main_file_and_in_included_files(write: Write) -> None:
+    use = "<link name=\"${xacro.abs_filename('x.yaml')}\"/>"
+    part = write(f"<robot {NAMESPACE}>{use}</robot>", "parts/part.xacro")
+    path = write(
+        f'<robot name="r" {NAMESPACE}>{use}<xacro:include filename="parts/part.xacro"/></robot>', "r.xacro"
+    )
+    text = expand(path, {}).decode()
+    for folder in (path.parent, part.parent):
+        assert f'"{folder}/x.yaml"' in text
+
+
 def test_the_expansion_stays_in_the_working_directory(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(arm.parents[1])
     assert b'name="tool"' in expand(Path("urdf/arm.urdf.xacro"), {})

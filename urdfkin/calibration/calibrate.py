@@ -94,7 +94,8 @@ class Calibration:
         model: The model with the parameters to fit.
         identification: The parameters that are identifiable from the measured poses. Without poses, the same
             as `general_identification`.
-        general_identification: The parameters that are identifiable from random poses.
+        general_identification: The parameters that are identifiable from random poses. Parameters that only
+            noise makes identifiable are not included.
         full_fit: The fit; None without poses.
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
@@ -354,9 +355,13 @@ def fit_model(
         q = np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
     path_q, measurements = _check_measured(robot, model, q, poses)
     data, calibration = _fit(robot, model, path_q, measurements, noise, drop_outliers, write_all=write_all)
-    identifiable = identify(
-        model, general, full_poses=measurements.full_poses, parameter_values=data.full_fit.parameter_values
-    )
+    # At the fitted values, noise can make more parameters identifiable, for example a tip beside an axis.
+    for fitted in (data.base_tool_fit, data.full_fit):
+        identifiable = identify(
+            model, general, full_poses=measurements.full_poses, parameter_values=fitted.parameter_values
+        )
+        if identifiable.rank >= data.identification.rank:
+            break
     calibration = replace(calibration, general_identification=identifiable)
     if check:
         calibration = replace(calibration, plausibility=check_plausibility(data, radians=radians))
@@ -408,22 +413,16 @@ def _fit(
     *,
     write_all: bool,
 ) -> tuple[FitWithData, Calibration]:
-    stated, start = None if noise is None else _parse_noise(noise), estimate_start_values(model, measurements)
-    identification = identify(
-        model, measurements.joint_values, full_poses=measurements.full_poses, parameter_values=start
-    )
-    ends = [k for k in identification.free_parameters if model.chain.parameters[k].is_base_or_tool]
-    before = fit_parameters(model, measurements, ends, stated, start)
-    full_fit = fit_parameters(
-        model, measurements, identification.free_parameters, stated, before.parameter_values
-    )
-    identification, full_fit = _add_identifiable(model, measurements, identification, stated, full_fit)
+    stated = None if noise is None else _parse_noise(noise)
+    identification, before, full_fit = _fit_identifiable(model, measurements, stated)
     odd, clean = reject_outliers(model, measurements, identification.free_parameters, stated, full_fit)
     if drop_outliers and odd:
         chosen = np.ones(len(measurements), dtype=bool)
         chosen[list(odd)] = False
-        q, measurements, full_fit = q[chosen], measurements.select(chosen), clean
-        before = fit_parameters(model, measurements, ends, stated, before.parameter_values)
+        q, measurements = q[chosen], measurements.select(chosen)
+        # An outlier can make parameters seem identifiable that the other poses do not identify.
+        identification, before, full_fit = _fit_identifiable(model, measurements, stated)
+        clean = full_fit
     fit = FitWithData(model, q, measurements, identification, before, full_fit)
     chosen_parameters, written = identification.free_parameters, full_fit
     if not write_all:
@@ -444,6 +443,23 @@ def _fit(
         written_fit=written,
         selected_parameters=chosen_parameters,
     )
+
+
+def _fit_identifiable(
+    model: CalibrationModel, measurements: Measurements, stated: Noise | None
+) -> tuple[Identification, Fit, Fit]:
+    """Return the identifiable parameters, a fit of base and tool alone, and a fit of all these parameters."""
+    start = estimate_start_values(model, measurements)
+    identification = identify(
+        model, measurements.joint_values, full_poses=measurements.full_poses, parameter_values=start
+    )
+    ends = [k for k in identification.free_parameters if model.chain.parameters[k].is_base_or_tool]
+    before = fit_parameters(model, measurements, ends, stated, start)
+    full_fit = fit_parameters(
+        model, measurements, identification.free_parameters, stated, before.parameter_values
+    )
+    identification, full_fit = _add_identifiable(model, measurements, identification, stated, full_fit)
+    return identification, before, full_fit
 
 
 def _refit_significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:

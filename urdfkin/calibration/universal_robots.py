@@ -64,12 +64,27 @@ _MAX_RESIDUAL = 1e-8
 _DISPLACEMENT_SAMPLES = 1000
 
 
+class _UniqueKeyLoader(yaml.SafeLoader):  # type: ignore[misc]
+    """Load YAML without repeated keys; PyYAML itself silently uses the last value."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set[str]()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.value in seen:
+                where = f"{key.start_mark.name}:{key.start_mark.line + 1}"
+                raise InputError("the calibration file contains a key twice", where=where, found=key.value)
+            seen.add(str(key.value))
+        return dict(super().construct_mapping(node, deep))
+
+
 def read_calibrated_origins(path: Path, order: str = "driver") -> dict[str, FloatArray]:
     """Return joint origins (4, 4) by joint name, from a calibration file or a `default_kinematics.yaml`."""
     if order not in ROTATION_ORDERS:
         raise UnknownNameError("order of rotations", order, ROTATION_ORDERS)
     try:
-        data = yaml.safe_load(read_text(path, pipes=True))
+        loader = _UniqueKeyLoader(read_text(path, pipes=True))
+        loader.name = str(path)
+        data = loader.get_single_data()
     except (yaml.YAMLError, RecursionError) as error:
         raise InputError(
             "this is not a YAML file", where=str(path), found=" ".join(str(error).split())[:100]

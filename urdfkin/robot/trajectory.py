@@ -113,7 +113,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
     if unknown or missing:
         wrong = {"unknown": unknown, "missing": missing}
         raise InputError(
-            "the arrays in the file are not those of a trajectory",
+            "the file has unknown arrays or lacks an array",
             where=str(path),
             found="; ".join(f"{word}: {', '.join(found)}" for word, found in wrong.items() if found),
             remedy=f"the possible names are {', '.join(shapes)}; required: {', '.join(required)}",

@@ -50,13 +50,17 @@ def serve() -> None:
 def _expand(
     path: Path, arguments: dict[str, str], search_paths: Mapping[str, str], allowed_paths: AllowedPaths
 ) -> dict[str, Any]:
+    import xacro
     import xacrodoc
 
     _replace_evaluation(path, search_paths, allowed_paths)
     importlib.import_module("xml.dom.expatbuilder")  # After `confine`, xacro cannot import this module.
     confine(allowed_paths.allows)
-    document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
-    urdf = document.to_urdf_string()
+    # `XacroDoc.from_file` expands the result again, and so evaluates the text that `$${...}` protects.
+    xacro.init_stacks(str(path))  # `xacro.abs_filename` needs the file's folder.
+    document = xacro.parse(path.read_text())
+    xacro.process_doc(document, mappings=arguments)
+    urdf = xacrodoc.XacroDoc(document, rootdir=path.parent).to_urdf_string()
     declared = (
         find_arguments(path, _make_package_finder(path, search_paths, allowed_paths)) if arguments else None
     )
