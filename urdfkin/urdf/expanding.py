@@ -58,7 +58,7 @@ def _expand(
     confine(allowed_paths.allows)
     # `XacroDoc.from_file` expands the result again, and so evaluates the text that `$${...}` protects.
     xacro.init_stacks(str(path))  # `xacro.abs_filename` needs the file's folder.
-    document = xacro.parse(path.read_text())
+    document = xacro.parse(path.read_text("utf-8"))
     xacro.process_doc(document, mappings=arguments)
     urdf = xacrodoc.XacroDoc(document, rootdir=path.parent).to_urdf_string()
     declared = (
