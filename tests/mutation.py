@@ -3,6 +3,7 @@
 The code of the function object is replaced, so every reference to the function calls the wrong code.
 """
 
+import inspect
 import types
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ _generator = np.random.default_rng(0)
 @contextmanager
 def slightly_wrong(function: Any) -> Iterator[None]:
     """Add random errors of about `SIZE` to the results of each call while the context is open."""
+    function = inspect.unwrap(function)  # A decorator such as `range_checked` calls the wrong code, too.
     key = f"{function.__module__}.{function.__qualname__}"
     code = function.__code__
     original = types.FunctionType(

@@ -96,7 +96,10 @@ def test_an_error_in_any_number_of_a_single_result_is_detected(name: str, method
             check(*inputs, None)
         wrong = np.unravel_index(place, shape)
         assert abs(caught.value.ours - caught.value.theirs)[wrong] > caught.value.bound[wrong]
-    assert robot.certificate().lines == ()
+    (line,) = robot.certificate().lines
+    assert (line.quantity, line.checked, line.unchecked) == (quantity.name, 0, 0)
+    assert line.bound_ratio > 1.0
+    assert not robot.certificate().verified
 
 
 def test_a_result_that_is_not_finite_is_detected() -> None:
