@@ -219,3 +219,22 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def test_an_output_does_not_replace_an_input_file(tmp_path: Path) -> None:
+    urdf = Path("robots/polar.urdf").read_text()
+    robot, function = tmp_path / "arm.urdf", tmp_path / "f.py"
+    for path in (robot, function):
+        path.write_text(urdf)
+    for words in (
+        ["placement", robot, "--format", "json", "--output", robot],
+        ["validate", robot, "--samples", "5", "--json", robot],
+        ["export", robot, "--to", "c", "--output", robot],
+        ["same", "polar", robot, "--html", robot],
+        ["check", tmp_path, "--output", robot],
+        ["check", robot, "--write-baseline", robot],
+        ["verify", function, "polar", "--junit", function],
+    ):
+        done = urdfkin(*map(str, words))
+        assert (done.code, "the output would replace the input" in done.err) == (2, True), words
+    assert robot.read_text() == function.read_text() == urdf

@@ -26,7 +26,7 @@ from urdfkin.cli.options import (
     root_joint_option,
     source_options,
 )
-from urdfkin.cli.output import write_output
+from urdfkin.cli.output import check_writable, write_output
 from urdfkin.cli.shell import complete_code, complete_file
 from urdfkin.cli.streams import escape_for_terminal, print_github_commands, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
@@ -332,6 +332,7 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     if not any(map(is_usd, run.words)):
         reject_unused_options(context, ("variant", "articulation"), "without a USD file")
+    check_writable(options["output"], options["write_baseline"], more_inputs=run.words)
     run.check_files()
     outcome = run.outcome
     if (baseline := run.finding_filter.baseline) is not None:

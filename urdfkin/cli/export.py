@@ -29,6 +29,7 @@ from urdfkin.cli.output import (
     Answer,
     answer_command,
     certificate_exit_code,
+    check_writable,
     format_check_line,
     output_option,
     write_output,
@@ -144,6 +145,7 @@ def export_command(
 
     assert robot is not None
     to = format_from_suffix(context, output, _LANGUAGES_OF_SUFFIXES, "c", "to")
+    check_writable(output)
     loaded = load_robot(robot, verify=verify)
     names = [word.strip() for words in quantities for word in words.split(",")] or list(DEFAULT_QUANTITIES)
     frame = loaded.tip_frame if frame is None else frame

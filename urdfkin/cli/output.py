@@ -9,7 +9,7 @@ import io
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import update_wrapper
@@ -185,15 +185,21 @@ def write_output(data: bytes | str, output: Path | None) -> None:
         sys.stdout.buffer.flush()
 
 
-def check_writable(*paths: Path | None) -> None:
+def check_writable(*paths: Path | None, more_inputs: Iterable[str] = ()) -> None:
     """Raise SourceError before a long computation if `write_file` cannot write an output file.
 
-    Raise UsageError if two options of a command name the same file. This check does not detect a full disk;
+    Raise UsageError if two options of a command name the same file, or if an option names an input file. The
+    input files are `more_inputs` and the command's arguments. This check does not detect a full disk;
     `write_file` does.
     """
     context = click.get_current_context(silent=True)
     targets: set[Path] = set() if context is None else context.meta.setdefault("output files", set())
-    for path in filter(None, paths):
+    arguments = [] if context is None else _argument_values(context)
+    outputs = [path for path in paths if path is not None]
+    inputs = (*arguments, *more_inputs) if outputs else ()
+    # Unlike `Path.is_file`, `os.path.isfile` accepts any text, for example a very long one.
+    protected = {Path(word).resolve() for word in inputs if os.path.isfile(word)}  # noqa: PTH113
+    for path in outputs:
         try:
             # `write_file` writes to a device or a pipe directly, without a temporary file.
             if path.exists() and not path.is_file():
@@ -201,6 +207,8 @@ def check_writable(*paths: Path | None) -> None:
             target = path.resolve()
             if target in targets:
                 raise click.UsageError(f"two options write the same file, {str(path)!r}; name two files")
+            if target in protected:
+                raise click.UsageError(f"the output would replace the input {str(path)!r}; name another file")
             targets.add(target)
             refuse_read_only(target)
             with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}."):
@@ -208,6 +216,15 @@ def check_writable(*paths: Path | None) -> None:
         except OSError as error:
             found = error.strerror or str(error)
             raise SourceError("cannot be written", where=str(path), found=found) from error
+
+
+def _argument_values(context: click.Context) -> Iterator[str | Path]:
+    for parameter in context.command.params:
+        if isinstance(parameter, click.Argument):
+            value = context.params.get(parameter.name or "")
+            for word in value if isinstance(value, tuple) else (value,):
+                if isinstance(word, str | Path):
+                    yield word
 
 
 def format_check_line(certificate: Certificate) -> str:
