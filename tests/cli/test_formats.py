@@ -238,3 +238,10 @@ def test_an_output_does_not_replace_an_input_file(tmp_path: Path) -> None:
         done = urdfkin(*map(str, words))
         assert (done.code, "the output would replace the input" in done.err) == (2, True), words
     assert robot.read_text() == function.read_text() == urdf
+
+
+def test_a_dash_writes_findings_to_standard_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Path("docs/examples/broken_arm.urdf").resolve()
+    monkeypatch.chdir(tmp_path)
+    assert "URDF507" in urdfkin("check", str(robot), "--output", "-").text
+    assert not Path("-").exists()

@@ -26,7 +26,7 @@ from urdfkin.cli.options import (
     root_joint_option,
     source_options,
 )
-from urdfkin.cli.output import check_writable, write_output
+from urdfkin.cli.output import check_writable, output_option, write_output
 from urdfkin.cli.shell import complete_code, complete_file
 from urdfkin.cli.streams import escape_for_terminal, print_github_commands, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
@@ -262,13 +262,7 @@ size_limit_options = combine(
     "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal",
     help="Output format.",
 )  # fmt: skip
-@click.option(
-    "--output",
-    "-o",
-    type=FILE,
-    help="Write the findings, or the patch of --diff, to this file.",
-    show_default="standard output",
-)
+@output_option("Write the findings, or the patch of --diff, to this file.")
 @click.option("--fix", is_flag=True, help="Make the automatic fixes in the files.")
 @click.option(
     "--unsafe-fixes",
