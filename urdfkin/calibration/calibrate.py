@@ -415,7 +415,14 @@ def _fit(
 ) -> tuple[FitWithData, Calibration]:
     stated = None if noise is None else _parse_noise(noise)
     identification, before, full_fit = _fit_identifiable(model, measurements, stated)
-    odd, clean = reject_outliers(model, measurements, identification.free_parameters, stated, full_fit)
+
+    def identify_again(rest: Measurements) -> tuple[Sequence[int], Fit]:
+        found, _, fit = _fit_identifiable(model, rest, stated)
+        return found.free_parameters, fit
+
+    odd, clean = reject_outliers(
+        model, measurements, identification.free_parameters, stated, full_fit, identify_again
+    )
     if drop_outliers and odd:
         chosen = np.ones(len(measurements), dtype=bool)
         chosen[list(odd)] = False

@@ -73,7 +73,7 @@ R_B.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -438,7 +438,14 @@ def reject_outliers(
     free_parameters: Sequence[int],
     noise: Noise | None,
     fit: Fit,
+    identify_again: Callable[[Measurements], tuple[Sequence[int], Fit]],
 ) -> tuple[tuple[int, ...], Fit]:
+    """Return the indices of the outliers, and a fit without them.
+
+    One outlier is rejected after another. A large outlier can make parameters seem identifiable, and can lead
+    the fit to a wrong minimum. Therefore, `identify_again` determines the free parameters again and fits
+    them, after 1, 2, 4, 8, ... rejected poses. It is slower than a fit.
+    """
     out = list[int]()
     # The remaining poses must give more numbers than there are parameters.
     max_outliers = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
@@ -453,9 +460,11 @@ def reject_outliers(
         out.append(int(inside[worst]))
         chosen = np.ones(len(measurements), dtype=bool)
         chosen[out] = False
-        clean = fit_parameters(
-            model, measurements.select(chosen), free_parameters, noise, clean.parameter_values
-        )
+        rest = measurements.select(chosen)
+        if len(out).bit_count() == 1:
+            free_parameters, clean = identify_again(rest)
+        else:
+            clean = fit_parameters(model, rest, free_parameters, noise, clean.parameter_values)
     return tuple(sorted(out)), clean
 
 
