@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from urdfkin.system.files import read_text
 from urdfkin.urdf.catalogue import find_package
 from urdfkin.urdf.confinement import MAX_MEMORY, AllowedPaths, confine, limit_process
 from urdfkin.urdf.expressions import RefusedError, evaluate
@@ -53,12 +54,13 @@ def _expand(
     import xacro
     import xacrodoc
 
+    text = read_text(path)
     _replace_evaluation(path, search_paths, allowed_paths)
     importlib.import_module("xml.dom.expatbuilder")  # After `confine`, xacro cannot import this module.
     confine(allowed_paths.allows)
     # `XacroDoc.from_file` expands the result again, and so evaluates the text that `$${...}` protects.
     xacro.init_stacks(str(path))  # `xacro.abs_filename` needs the file's folder.
-    document = xacro.parse(path.read_text("utf-8"))
+    document = xacro.parse(text)
     xacro.process_doc(document, mappings=arguments)
     urdf = xacrodoc.XacroDoc(document, rootdir=path.parent).to_urdf_string()
     declared = (
