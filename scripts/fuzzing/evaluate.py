@@ -85,7 +85,8 @@ def _evaluate_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome
 
 def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
     too_large = "a result is not a finite number"
-    if _SIZES & {finding.code for finding in findings}:
+    sizes = _SIZES & {finding.code for finding in findings}
+    if sizes:
         too_large = "too large to compute; a finding states the reason"
     try:
         for computation, result in compute_all(robot, seed=0):
@@ -93,7 +94,7 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
                 return Outcome(too_large, computation)
         # The certificate does not cover DH tables, but a table that is not verified causes a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
-        verified = robot.certificate().verified and not doubted
+        certified = robot.certificate().verified
         compare_prepared(robot, seed=0)
     except (urdfkin.VerificationError, urdfkin.TableError, RangeError, MismatchError) as error:
         words = {
@@ -103,11 +104,13 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
             MismatchError: "two computations of one result differ",
         }
         return Outcome(next(word for kind, word in words.items() if isinstance(error, kind)), str(error))
-    if verified:
+    if certified and not doubted:
         return Outcome("verified")
-    for finding in findings:
-        if finding.pinocchio_reading is not None:
-            return Outcome("not verified; a finding states the reason", finding.code)
+    reasons = [finding.code for finding in findings if finding.pinocchio_reading is not None]
+    # Huge numbers can make a table inaccurate, although all other results are verified.
+    reasons += sorted(sizes) if certified else []
+    if reasons:
+        return Outcome("not verified; a finding states the reason", reasons[0])
     if (reason := robot.verifier.find_refusal()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
     texts = "; ".join(str(w.message) for w in warned)
