@@ -285,7 +285,8 @@ def test_killed_workers_of_a_cluster_change_no_result(
 
 def _running(there: LocalCluster) -> list[int]:
     """Return the running workers, which Dask replaces if they end."""
-    return [nanny.pid for nanny in there.workers.values() if nanny.status == Status.running]
+    pids = (nanny.pid for nanny in there.workers.values() if nanny.status == Status.running)
+    return [pid for pid in pids if pid is not None]  # A nanny has no pid while its worker ends.
 
 
 @contextmanager
