@@ -22,6 +22,7 @@ from urdfkin.comparison.certificate import SAME
 from urdfkin.comparison.result import Verdict
 from urdfkin.dh import make_dh_table
 from urdfkin.model.mechanisms import matcher
+from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.writer import to_urdf
@@ -274,6 +275,13 @@ def test_a_common_base_and_a_common_tip_fix_the_zeros_of_prismatic_joints(common
         assert moves_alike(found, a, b)
 
 
+def renamed(tree: KinematicTree, kept: set[str]) -> Robot:
+    """Return a robot with other names of all joints, and of all links except `kept`."""
+    joints = {one.name: f"other_{one.name}" for one in tree.joints}
+    links = {link: link if link in kept else f"other_{link}" for link in tree.links}
+    return loaded(pairs.with_names(tree, joints, links))
+
+
 #: The kind, the parent link and the axis of each joint.
 MOBILE_ARM = [("planar", 0, ""), ("continuous", 1, "0 0 1"), ("revolute", 2, "0 1 0")]
 BESIDE_TWO_PLANES = [("planar", 0, ""), ("revolute", 0, "1 0 0"), ("planar", 0, "")]
@@ -302,10 +310,7 @@ def test_a_robot_with_planar_joints_is_found_with_few_common_links(
             verify=False,
         )
         moved = pairs.counted_elsewhere(pairs.on_a_stand(a.tree))
-        kept = {a.tree.links[i] for i in common}
-        joints = {one.name: f"other_{one.name}" for one in moved.joints}
-        links = {link: link if link in kept else f"other_{link}" for link in moved.links}
-        b = loaded(pairs.with_names(moved, joints, links))
+        b = renamed(moved, {a.tree.links[i] for i in common})
         found = urdfkin.same(a, b)
         assert found.verdict is Verdict.SAME_AFTER, seed
         assert moves_alike(found, a, b)
@@ -346,20 +351,17 @@ def test_random_robots_with_planar_and_floating_joints_are_found_with_few_common
         verify=False,
     )
     moved = pairs.counted_elsewhere(pairs.on_a_stand(pairs.shifted(pairs.flipped(a.tree))))
-    joints = {one.name: f"other_{one.name}" for one in moved.joints}
-    links = {link: link if link in {f"l{i}" for i in common} else f"other_{link}" for link in moved.links}
-    other = pairs.with_names(moved, joints, links)
-    found = urdfkin.same(a, loaded(other))
+    b = renamed(moved, {f"l{i}" for i in common})
+    found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME_AFTER
-    assert moves_alike(found, a, loaded(other))
-    assert certified(found, a, loaded(other))
+    assert moves_alike(found, a, b)
+    assert certified(found, a, b)
 
 
 def test_a_common_link_after_the_first_joint_fixes_the_base() -> None:
     a = built(joint("j", "revolute", "base", "arm", 'xyz="0.22 0 0"', "0 1 0", limit(-1, 1)), verify=False)
     moved = pairs.on_a_stand(a.tree)
-    links = {link: link if link == "arm" else f"other_{link}" for link in moved.links}
-    b = loaded(pairs.with_names(moved, {one.name: f"other_{one.name}" for one in moved.joints}, links))
+    b = renamed(moved, {"arm"})
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME_AFTER
     assert moves_alike(found, a, b)
