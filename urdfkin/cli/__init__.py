@@ -236,7 +236,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     help="Show the versions of urdfkin and Pinocchio and exit.",
 )  # fmt: skip
 def cli() -> None:
-    """Textbook kinematics from any URDF, every number checked against Pinocchio.
+    """Textbook kinematics of URDF robots, with results checked against Pinocchio.
 
     ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
     shows the options of a command, and an example.
